@@ -1,0 +1,154 @@
+"""The ``dnacheck`` command: a group that loads a subcommand only when it is invoked.
+
+Exit codes: 0 done and every check passed; 1 a check failed; 2 bad input or usage; 3 a computation
+did not converge; 70 an internal error; 130 interrupted; 141 the reader of the output went away.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+
+import click
+
+from dnacheck import __version__
+
+EXIT_OK = 0
+EXIT_CHECK_FAILED = 1
+EXIT_INPUT = 2
+EXIT_NOT_CONVERGED = 3
+EXIT_INTERNAL = 70
+EXIT_INTERRUPTED = 130
+EXIT_BROKEN_PIPE = 141
+
+COMMAND_HELP = {
+    "ring": "Ring equilibria of a molecule, discrete and continuum.",
+    "sweep": "Ring energies over a range of twist ratios.",
+    "diagram": "Bifurcation diagram: energy and end moment against end twist.",
+    "jfactor": "Cyclization probability (J factor) of a molecule.",
+    "md": "Check a ring with an OpenMM bead chain.",
+    "scan": "Ring energy and J factor of many sequences, resumable.",
+    "validate": "Run a validation scene and write its report.",
+}
+"""One-line help of each command, kept here so that the group's help imports none of them."""
+
+
+class CommandUnavailableError(Exception):
+    """A known command whose module, or a library it needs, is not installed."""
+
+
+class LazyGroup(click.Group):
+    """A group whose commands are the ``command`` objects of ``dnacheck.commands.NAME``."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMAND_HELP)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMAND_HELP:
+            return None
+        name = f"dnacheck.commands.{cmd_name}"
+        try:
+            command = importlib.import_module(name).command
+        except ModuleNotFoundError as error:
+            if error.name == name:
+                reason = "is not part of this installation"
+            else:
+                reason = f"needs the Python module '{error.name}', which is not installed"
+            raise CommandUnavailableError(f"the command '{cmd_name}' {reason}") from error
+        assert isinstance(command, click.Command)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMAND_HELP.items()))
+
+
+@click.group(
+    cls=LazyGroup,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog="Example:  dnacheck ring 11T15",
+)
+@click.version_option(__version__, prog_name="dnacheck")
+def cli() -> None:
+    """Elastic DNA rings: wedge chains and continuum rods, each checked against the other.
+
+    TARGET, where a command takes one, is the name of an embedded molecule (11T15), a literal
+    sequence, or a FASTA file.
+    """
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return the exit code; never raises and never exits.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Arguments without the program name; by default those of the process.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    debug = "--debug" in arguments
+    try:
+        code = _run(arguments)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _silence_stdout()
+        return EXIT_BROKEN_PIPE
+    except BaseException as error:
+        code, message = _explain(error, debug)
+        if debug and not isinstance(error, SystemExit):
+            traceback.print_exc()
+        if message:
+            print(message, file=sys.stderr)
+    return code
+
+
+def _run(arguments: list[str]) -> int:
+    """Parse and invoke; the exit code is what the command returned, None meaning 0."""
+    try:
+        with cli.make_context("dnacheck", arguments) as context:
+            outcome = cli.invoke(context)
+    except click.exceptions.Exit as stop:
+        return stop.exit_code
+    return int(outcome) if outcome is not None else EXIT_OK
+
+
+def _explain(error: BaseException, debug: bool) -> tuple[int, str]:
+    """Exit code and one-line message of an exception."""
+    # Imported here: help and usage errors of a healthy run do not need it.
+    from dnacheck.numerics.outcome import InputError, SolveError
+
+    if isinstance(error, click.exceptions.NoArgsIsHelpError):
+        return EXIT_INPUT, error.format_message()
+    if isinstance(error, click.UsageError):
+        path = error.ctx.command_path if error.ctx else "dnacheck"
+        return EXIT_INPUT, f"{path}: {_one_line(error.format_message())} (see '{path} --help')"
+    if isinstance(error, click.ClickException):
+        return EXIT_INPUT, f"dnacheck: {_one_line(error.format_message())}"
+    if isinstance(error, InputError):
+        return EXIT_INPUT, f"dnacheck: {_one_line(str(error))}"
+    if isinstance(error, SolveError):
+        return EXIT_NOT_CONVERGED, f"dnacheck: {_one_line(str(error))}"
+    if isinstance(error, KeyboardInterrupt | click.Abort):
+        return EXIT_INTERRUPTED, "dnacheck: interrupted"
+    if isinstance(error, CommandUnavailableError):
+        return EXIT_INTERNAL, f"dnacheck: {_one_line(str(error))}"
+    if isinstance(error, SystemExit):
+        return (error.code if isinstance(error.code, int) else EXIT_INTERNAL), ""
+    hint = "" if debug else "; run with --debug for the traceback"
+    what = _one_line(f"{type(error).__name__}: {error}")
+    return EXIT_INTERNAL, f"dnacheck: internal error ({what}){hint}"
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _silence_stdout() -> None:
+    """Point standard output at nothing, so that the interpreter's last flush does not fail."""
+    try:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except (OSError, ValueError):
+        sys.stdout = None  # type: ignore[assignment]
