@@ -1,0 +1,1 @@
+"""Rotations, statuses and statistics: what every other layer stands on."""
