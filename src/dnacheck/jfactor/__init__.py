@@ -1,0 +1,1 @@
+"""Cyclization probabilities (J factors) by independent methods."""

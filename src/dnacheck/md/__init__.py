@@ -1,0 +1,1 @@
+"""Independent check of rings: OpenMM bead chains, read back with MDAnalysis."""

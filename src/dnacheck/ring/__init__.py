@@ -1,0 +1,1 @@
+"""Closed rings: discrete equilibria, continuum equilibria, and the way between them."""

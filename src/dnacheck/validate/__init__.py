@@ -1,0 +1,1 @@
+"""Scenes, checks with verdicts, figures and the report."""
