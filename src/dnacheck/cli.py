@@ -6,7 +6,10 @@ did not converge; 70 an internal error; 130 interrupted; 141 the reader of the o
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import importlib
+import io
 import os
 import sys
 import traceback
@@ -89,20 +92,16 @@ def main(argv: Sequence[str] | None = None) -> int:
         Arguments without the program name; by default those of the process.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
-    debug = "--debug" in arguments
+    if argv is None and isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # a terminal without Å is no error
     try:
         code = _run(arguments)
-        sys.stdout.flush()
     except BrokenPipeError:
         _silence_stdout()
         return EXIT_BROKEN_PIPE
     except BaseException as error:
-        code, message = _explain(error, debug)
-        if debug and not isinstance(error, SystemExit):
-            traceback.print_exc()
-        if message:
-            print(message, file=sys.stderr)
-    return code
+        code = _report(error, debug="--debug" in arguments)
+    return _flushed(code)
 
 
 def _run(arguments: list[str]) -> int:
@@ -115,8 +114,34 @@ def _run(arguments: list[str]) -> int:
     return int(outcome) if outcome is not None else EXIT_OK
 
 
+def _report(error: BaseException, debug: bool) -> int:
+    """Write what happened to standard error, and return the exit code."""
+    code, message = _explain(error, debug)
+    with contextlib.suppress(OSError):
+        if debug and not isinstance(error, SystemExit):
+            traceback.print_exception(error)
+        if message:
+            print(message, file=sys.stderr)
+    return code
+
+
+def _flushed(code: int) -> int:
+    """Flush standard output; the exit code tells if that failed."""
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        _silence_stdout()
+        return EXIT_BROKEN_PIPE
+    except OSError as error:
+        _silence_stdout()
+        print(f"dnacheck: cannot write: {error.strerror}", file=sys.stderr)
+        return code or EXIT_INPUT
+    return code
+
+
 def _explain(error: BaseException, debug: bool) -> tuple[int, str]:
-    """Exit code and one-line message of an exception."""
+    """Exit code and message of an exception."""
     # Imported here: help and usage errors of a healthy run do not need it.
     from dnacheck.numerics.outcome import InputError, SolveError
 
@@ -136,7 +161,11 @@ def _explain(error: BaseException, debug: bool) -> tuple[int, str]:
     if isinstance(error, CommandUnavailableError):
         return EXIT_INTERNAL, f"dnacheck: {_one_line(str(error))}"
     if isinstance(error, SystemExit):
-        return (error.code if isinstance(error.code, int) else EXIT_INTERNAL), ""
+        if error.code is None or isinstance(error.code, int):
+            return error.code or EXIT_OK, ""
+        return EXIT_CHECK_FAILED, str(error.code)
+    if isinstance(error, OSError) and error.errno == errno.ENOSPC:
+        return EXIT_INPUT, f"dnacheck: cannot write: {error.strerror}"
     hint = "" if debug else "; run with --debug for the traceback"
     what = _one_line(f"{type(error).__name__}: {error}")
     return EXIT_INTERNAL, f"dnacheck: internal error ({what}){hint}"
@@ -151,4 +180,4 @@ def _silence_stdout() -> None:
     try:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (OSError, ValueError):
-        sys.stdout = None  # type: ignore[assignment]
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - lives as long as the process

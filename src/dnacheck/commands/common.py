@@ -1,0 +1,329 @@
+"""Options that the commands share, each group gathered into one frozen object.
+
+A command is written ::
+
+    @click.command()
+    @target_argument
+    @model_options
+    @common_options
+    def command(target: str, model: ModelSettings, run: RunSettings) -> int | None: ...
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import os
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import Any, Literal, TypeVar
+
+import click
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """How to run and how to report, as given by ``--json --seed --threads --quiet --debug``."""
+
+    json: bool
+    """One JSON object on standard output and nothing else there."""
+    seed: int
+    """Seed of every random stream of the run."""
+    threads: int
+    """Threads to use, at least 1; no result depends on it."""
+    quiet: bool
+    """No progress bar and no notes on standard error."""
+    debug: bool
+    """Show the traceback of an error."""
+
+
+@dataclass(frozen=True)
+class ModelSettings:
+    """Which elastic chain is meant."""
+
+    angles: str
+    """Name of an angle set, or path of a TOML file."""
+    twist_ratio: float
+    """Twisting over bending stiffness, K_tau / K_theta."""
+    persistence_length: float
+    """Å."""
+    rise: float
+    """Å per base-pair step."""
+    a_tracts: Literal["auto", "none"] | tuple[int, int]
+    """Steps with the A-tract twist: by rule, none, or first and last (0-based, both included)."""
+
+    def chain_arguments(self) -> dict[str, Any]:
+        """Keyword arguments of :func:`dnacheck.model.chain.build_chain`."""
+        return {
+            "angles": self.angles,
+            "twist_ratio": self.twist_ratio,
+            "persistence_length_A": self.persistence_length,
+            "rise_A": self.rise,
+            "a_tracts": self.a_tracts,
+        }
+
+
+@dataclass(frozen=True)
+class RingSettings:
+    """Which rings are sought."""
+
+    model: Literal["continuum", "discrete", "both"]
+    link: Literal["auto", "all"] | int
+
+
+@dataclass(frozen=True)
+class ContinuumSettings:
+    """How the continuum rod is made: the paper's w, k and m."""
+
+    filter_width: int
+    """Base pairs, w."""
+    intervals: int
+    """Spline pieces, k."""
+    degree: int
+    """Of the polynomials, m."""
+
+
+class PositiveNumber(click.ParamType):
+    """A finite number greater than zero."""
+
+    name = "number"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        try:
+            number = float(value)
+        except (TypeError, ValueError):
+            self.fail(f"{value!r} is not a number", param, ctx)
+        if not (math.isfinite(number) and number > 0.0):
+            self.fail(f"{value} is not a finite number greater than 0", param, ctx)
+        return number
+
+
+class LinkChoice(click.ParamType):
+    """``auto``, ``all`` or an integer."""
+
+    name = "auto|all|integer"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> str | int:
+        if isinstance(value, int) or value in ("auto", "all"):
+            return value
+        try:
+            return int(value)
+        except ValueError:
+            self.fail(f"{value!r} is not 'auto', 'all' or an integer", param, ctx)
+
+
+class StepRange(click.ParamType):
+    """``auto``, ``none`` or ``A..B``, 0-based steps, both included."""
+
+    name = "auto|none|A..B"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> str | tuple[int, int]:
+        if isinstance(value, tuple) or value in ("auto", "none"):
+            return value
+        match = re.fullmatch(r"([0-9]{1,9})\.\.([0-9]{1,9})", value)
+        if match is None:
+            self.fail(f"{value!r} is not 'auto', 'none' or A..B, such as 30..92", param, ctx)
+        first, last = int(match[1]), int(match[2])
+        if first > last:
+            self.fail(f"the first step {first} lies after the last step {last}", param, ctx)
+        return first, last
+
+
+def available_processors() -> int:
+    """Processors that this process may use."""
+    try:
+        return max(1, len(os.sched_getaffinity(0)))
+    except AttributeError:  # not offered by every operating system
+        return os.cpu_count() or 1
+
+
+def limit_library_threads(threads: int) -> None:
+    """Tell libraries that are not loaded yet to use at most so many threads."""
+    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[variable] = str(threads)
+
+
+def _threads(ctx: click.Context, param: click.Parameter, value: int | None) -> int:
+    if value is None:
+        return available_processors()
+    limit_library_threads(value)
+    return value
+
+
+def _gathered(
+    function: Function, argument: str, settings: type, options: list[Callable[[Any], Any]]
+) -> Function:
+    """Add the options to a command function and pass them as one settings object."""
+    names = [field.name for field in fields(settings)]
+
+    @functools.wraps(function)
+    def call(**values: Any) -> Any:
+        values[argument] = settings(**{name: values.pop(f"{argument}__{name}") for name in names})
+        return function(**values)
+
+    decorated: Any = call
+    for option in reversed(options):
+        decorated = option(decorated)
+    return decorated
+
+
+target_argument = click.argument("target", metavar="TARGET")
+
+
+def common_options(function: Function) -> Function:
+    """Give a command ``--json --seed --threads --quiet --debug``; it receives ``run``."""
+    return _gathered(
+        function,
+        "run",
+        RunSettings,
+        [
+            click.option(
+                "--json",
+                "run__json",
+                is_flag=True,
+                help="Print one JSON object on standard output and nothing else.",
+            ),
+            click.option(
+                "--seed",
+                "run__seed",
+                type=click.IntRange(min=0),
+                default=0,
+                show_default=True,
+                help="Seed of the random numbers.",
+            ),
+            click.option(
+                "--threads",
+                "run__threads",
+                type=click.IntRange(min=1),
+                default=None,
+                callback=_threads,
+                help="Threads to use; results do not depend on it.  [default: all processors]",
+            ),
+            click.option("--quiet", "run__quiet", is_flag=True, help="No progress, no notes."),
+            click.option(
+                "--debug", "run__debug", is_flag=True, help="Show the traceback of an error."
+            ),
+        ],
+    )
+
+
+def model_options(function: Function) -> Function:
+    """Give a command the options of the elastic chain; it receives ``model``."""
+    return _gathered(
+        function,
+        "model",
+        ModelSettings,
+        [
+            click.option(
+                "--angles",
+                "model__angles",
+                metavar="trifonov2|trifonov|desantis|FILE",
+                default="trifonov2",
+                show_default=True,
+                help="Angle set, or a TOML file with one.",
+            ),
+            click.option(
+                "--twist-ratio",
+                "model__twist_ratio",
+                type=PositiveNumber(),
+                default=1.5,
+                show_default=True,
+                help="Twisting over bending stiffness.",
+            ),
+            click.option(
+                "--persistence-length",
+                "model__persistence_length",
+                type=PositiveNumber(),
+                default=463.0,
+                show_default=True,
+                help="In Å.",
+            ),
+            click.option(
+                "--rise",
+                "model__rise",
+                type=PositiveNumber(),
+                default=3.4,
+                show_default=True,
+                help="In Å per base-pair step.",
+            ),
+            click.option(
+                "--a-tracts",
+                "model__a_tracts",
+                type=StepRange(),
+                default="auto",
+                show_default=True,
+                help="Steps with the A-tract twist, 0-based, both ends included.",
+            ),
+        ],
+    )
+
+
+def ring_options(function: Function) -> Function:
+    """Give a command ``--model`` and ``--link``; it receives ``ring``."""
+    return _gathered(
+        function,
+        "ring",
+        RingSettings,
+        [
+            click.option(
+                "--model",
+                "ring__model",
+                type=click.Choice(["continuum", "discrete", "both"]),
+                default="both",
+                show_default=True,
+                help="Which equilibria to compute.",
+            ),
+            click.option(
+                "--link",
+                "ring__link",
+                type=LinkChoice(),
+                default="auto",
+                show_default=True,
+                help="Links to search.",
+            ),
+        ],
+    )
+
+
+def continuum_options(function: Function) -> Function:
+    """Give a command ``--filter-width --intervals --degree``; it receives ``continuum``."""
+    return _gathered(
+        function,
+        "continuum",
+        ContinuumSettings,
+        [
+            click.option(
+                "--filter-width",
+                "continuum__filter_width",
+                type=click.IntRange(min=1),
+                default=15,
+                show_default=True,
+                help="Width of the filter, base pairs.",
+            ),
+            click.option(
+                "--intervals",
+                "continuum__intervals",
+                type=click.IntRange(min=1),
+                default=20,
+                show_default=True,
+                help="Pieces of the spline.",
+            ),
+            click.option(
+                "--degree",
+                "continuum__degree",
+                type=click.IntRange(min=1),
+                default=6,
+                show_default=True,
+                help="Degree of the spline.",
+            ),
+        ],
+    )

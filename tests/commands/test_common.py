@@ -1,0 +1,103 @@
+"""Options that the commands share."""
+
+import inspect
+import os
+
+import click
+import pytest
+
+from dnacheck.commands.common import (
+    ContinuumSettings,
+    ModelSettings,
+    RingSettings,
+    RunSettings,
+    available_processors,
+    common_options,
+    continuum_options,
+    model_options,
+    ring_options,
+    target_argument,
+)
+from dnacheck.model.chain import build_chain
+
+
+@pytest.fixture(autouse=True)
+def library_threads(monkeypatch):
+    """--threads sets these for the process; the test gives them back."""
+    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        monkeypatch.setenv(variable, "1")
+
+
+@click.command()
+@target_argument
+@ring_options
+@model_options
+@continuum_options
+@common_options
+def command(**settings):
+    return settings
+
+
+def parse(*arguments):
+    return command.main(["11T15", *arguments], standalone_mode=False)
+
+
+def test_defaults_are_those_of_the_paper():
+    assert parse() == {
+        "target": "11T15",
+        "model": ModelSettings("trifonov2", 1.5, 463.0, 3.4, "auto"),
+        "ring": RingSettings("both", "auto"),
+        "continuum": ContinuumSettings(15, 20, 6),
+        "run": RunSettings(False, 0, available_processors(), False, False),
+    }
+
+
+def test_every_option_arrives():
+    settings = parse(
+        *"--angles own.toml --twist-ratio 0.7 --persistence-length 500 --rise 3.3".split(),
+        *"--a-tracts 30..92 --model discrete --link -3 --filter-width 11 --intervals 30".split(),
+        *"--degree 5 --json --seed 7 --threads 3 --quiet --debug".split(),
+    )
+    assert settings == {
+        "target": "11T15",
+        "model": ModelSettings("own.toml", 0.7, 500.0, 3.3, (30, 92)),
+        "ring": RingSettings("discrete", -3),
+        "continuum": ContinuumSettings(11, 30, 5),
+        "run": RunSettings(True, 7, 3, True, True),
+    }
+    assert os.environ["OMP_NUM_THREADS"] == "3"
+
+
+def test_model_settings_name_the_arguments_of_build_chain():
+    accepted = inspect.signature(build_chain).parameters
+    assert set(parse()["model"].chain_arguments()) <= set(accepted)
+
+
+@pytest.mark.parametrize("link", ["auto", "all"])
+def test_links_by_name(link):
+    assert parse("--link", link)["ring"].link == link
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "text"),
+    [
+        ("--twist-ratio", "0", "not a finite number greater than 0"),
+        ("--twist-ratio", "-1", "greater than 0"),
+        ("--twist-ratio", "nan", "greater than 0"),
+        ("--rise", "inf", "greater than 0"),
+        ("--persistence-length", "long", "'long' is not a number"),
+        ("--link", "1.5", "not 'auto', 'all' or an integer"),
+        ("--a-tracts", "5", "such as 30..92"),
+        ("--a-tracts", "9..5", "lies after"),
+        ("--a-tracts", "1..9999999999", "such as 30..92"),
+        ("--degree", "0", "0 is not in the range"),
+        ("--seed", "-1", "-1 is not in the range"),
+        ("--model", "both-of-them", "is not one of"),
+    ],
+)
+def test_bad_values_are_named(option, value, text):
+    with pytest.raises(click.UsageError) as caught:
+        parse(option, value)
+    message = caught.value.format_message()
+    assert option in message
+    assert text in message
