@@ -10,7 +10,7 @@ PIP     := $(PY) -m pip --disable-pip-version-check --no-input -qq
 PYTEST  := $(BIN)/pytest
 
 FIND_PYTHON = for p in $(PYTHON) python3.11 python3.12 python3.13 python3; do \
-	if $$p -c 'import sys, venv; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; \
+	if $$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; \
 	then echo $$p; break; fi; done
 
 .DEFAULT_GOAL := help
@@ -34,8 +34,9 @@ $(STAMP): requirements.lock pyproject.toml | $(PY)
 	@awk '/^[^ ]/ { keep = /^uv==/ } keep' requirements.lock > $(VENV)/uv.lock
 	@$(PIP) install --require-hashes --no-deps -r $(VENV)/uv.lock
 	@$(PY) -m uv pip install --quiet --python $(PY) --require-hashes --no-deps \
-		-r requirements.lock || \
-	$(PIP) install --require-hashes --no-deps --no-compile -r requirements.lock
+		-r requirements.lock 2>/dev/null || { \
+		echo "uv cannot reach the packages; pip installs them (about a minute)"; \
+		$(PIP) install --require-hashes --no-deps --no-compile -r requirements.lock; }
 	@$(PIP) install --no-deps --no-build-isolation --editable .
 	@touch $@
 
@@ -46,7 +47,7 @@ lint: $(STAMP) ## style, types, import contracts, spelling
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	PYTHONPATH=src $(BIN)/lint-imports --no-cache
+	$(BIN)/lint-imports --no-cache
 	$(BIN)/codespell
 
 test: lint ## linters and the fast tests
