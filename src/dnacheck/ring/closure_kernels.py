@@ -23,7 +23,7 @@ from dnacheck.numerics.rotations import rotation_log
 _ORTHONORMALISE_EVERY = 64
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath={"contract"})
 def _midstep_axes(tau: float, theta: float, phi: float, frame: Any, out: Any) -> None:
     """Axes (5, 3) of tau/2, theta/2, phi, theta/2, tau/2 carried by ``frame`` (3, 3)."""
     ct, st = math.cos(0.5 * tau), math.sin(0.5 * tau)
@@ -44,7 +44,7 @@ def _midstep_axes(tau: float, theta: float, phi: float, frame: Any, out: Any) ->
         out[4, i] = sh * y2 + ch * z3
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def linearise(angles: Any, form: int, centres: Any, frames: Any, axes: Any, halves: Any) -> None:
     """Frames of a chain and the axis of every angle, in one pass.
 
@@ -102,7 +102,7 @@ def linearise(angles: Any, form: int, centres: Any, frames: Any, axes: Any, halv
             orthonormalise(frames[s + 1])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath={"contract"})
 def energy_gradient(angles: Any, ground: Any, stiffness: Any, gradient: Any) -> float:
     """Reduced energy (2.3); its gradient (N, 3) is written into ``gradient``."""
     energy = 0.0
@@ -117,7 +117,7 @@ def energy_gradient(angles: Any, ground: Any, stiffness: Any, gradient: Any) -> 
     return energy
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath={"contract"})
 def closure_residual(centres: Any, frames: Any, out: Any) -> None:
     """End-to-end vector in steps and end rotation vector in radians, into ``out`` (6,)."""
     n = centres.shape[0] - 1
@@ -126,7 +126,7 @@ def closure_residual(centres: Any, frames: Any, out: Any) -> None:
     rotation_log(frames[n], out[3:])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath={"contract"})
 def closure_jacobian(centres: Any, axes: Any, out: Any) -> None:
     """Closure Jacobian (6, 3N): rows are the end's displacement (3) and rotation (3)."""
     n = axes.shape[0]
@@ -145,7 +145,7 @@ def closure_jacobian(centres: Any, axes: Any, out: Any) -> None:
             out[5, k] = a2
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath={"contract"})
 def lagrangian_residual(gradient: Any, centres: Any, axes: Any, multipliers: Any) -> float:
     """Largest entry of gradient + (closure Jacobian)^T multipliers, reduced units."""
     n = axes.shape[0]
@@ -166,7 +166,7 @@ def lagrangian_residual(gradient: Any, centres: Any, axes: Any, multipliers: Any
     return worst
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath={"contract"})
 def _coupling(axis: Any, x: float, y: float, z: float, m: Any, out: Any) -> None:
     """e = (a x d) x force + a x moment / 2 for an axis a (3,) and d = r_N - p."""
     a0, a1, a2 = axis[0], axis[1], axis[2]
@@ -178,7 +178,7 @@ def _coupling(axis: Any, x: float, y: float, z: float, m: Any, out: Any) -> None
     out[2] = b0 * m[1] - b1 * m[0] + 0.5 * (a0 * m[4] - a1 * m[3])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath={"contract"})
 def _midstep_block(halves: Any, x: float, y: float, z: float, m: Any, block: Any) -> None:
     """Second derivatives of closure within one mid-step, lower triangle of ``block`` (3, 3)."""
     e = np.empty((5, 3))
@@ -198,7 +198,7 @@ def _midstep_block(halves: Any, x: float, y: float, z: float, m: Any, block: Any
             block[outer, inner] += weight * h
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def factorise(
     gradient: Any,
     stiffness: Any,
@@ -340,7 +340,7 @@ def factorise(
     return negatives, log_pivots, weakest
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath={"contract"})
 def back_substitute(factors: Any, new_multipliers: Any, weight: float, step: Any) -> None:
     """Step (N, 3) = -H^-1 (weight gradient + G^T new multipliers) from :func:`factorise`."""
     n = factors.shape[0]
@@ -375,7 +375,7 @@ def back_substitute(factors: Any, new_multipliers: Any, weight: float, step: Any
             t2 += row[3 * k + 2] * step[s, k]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def solve_small(small: Any, rhs: Any, length: float, out: Any) -> tuple[int, float]:
     """Solve the 6 x 6 Schur system and count its negative eigenvalues.
 
@@ -462,7 +462,7 @@ def solve_small(small: Any, rhs: Any, length: float, out: Any) -> tuple[int, flo
     return negatives, log_det
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath={"contract"})
 def _swap(a: Any, order: Any, i: int, j: int) -> None:
     """Exchange rows and columns i and j of a symmetric system (6, 7) and of its order."""
     if i == j:

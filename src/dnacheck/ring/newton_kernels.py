@@ -234,30 +234,41 @@ def newton(
                 for s in range(n):
                     for j in range(3):
                         trial[s, j] = angles[s, j] + fraction * step[s, j]
-            for correction in range(2):
+            first_merit = math.inf
+            for evaluation in range(3):
                 linearise(trial, form, new_centres, new_frames, new_axes, halves)
                 trial_energy = energy_gradient(trial, ground, stiffness, new_gradient)
                 closure_residual(new_centres, new_frames, rhs)
                 trial_size = _closure_size(rhs, length)
                 trial_merit = trial_energy + weight * trial_size
-                if trial_merit <= merit + 1e-4 * fraction * descent + noise:
-                    accepted = True
-                elif whole and correction == 0 and math.isfinite(trial_merit):
-                    trial_residual = lagrangian_residual(
-                        new_gradient, new_centres, new_axes, target
-                    )
-                    for i in range(6):
-                        trial_residual = max(trial_residual, abs(rhs[i]))
-                    accepted = trial_residual <= 0.5 * figures[RESIDUAL]
-                if accepted or correction == 1 or not trial_size < 0.5:
+                accepted = trial_merit <= merit + 1e-4 * fraction * descent + noise
+                if evaluation == 2 or (evaluation == 1 and trial_merit <= first_merit):
                     break
-                # The step followed the linearised closure; undo what curvature made of it.
-                if solve_small(small, rhs, length, blend)[0] < 0:
-                    break
-                back_substitute(factors, blend, 0.0, mend)
+                if evaluation == 0:
+                    if whole and not accepted and math.isfinite(trial_merit):
+                        trial_residual = lagrangian_residual(
+                            new_gradient, new_centres, new_axes, target
+                        )
+                        for i in range(6):
+                            trial_residual = max(trial_residual, abs(rhs[i]))
+                        # Below the noise of the energy only the residual can judge a step.
+                        near = 2.0 if turn < 1e-6 else 0.5
+                        accepted = trial_residual <= near * figures[RESIDUAL]
+                        if accepted:
+                            break
+                    if accepted and (
+                        trial_size <= 0.5 * size or weight * trial_size <= -0.3 * fraction * descent
+                    ):
+                        break
+                    # The step followed the linearised closure; undo what curvature made of it.
+                    first_merit = trial_merit if accepted else math.inf
+                    if not trial_size < 0.5 or solve_small(small, rhs, length, blend)[0] < 0:
+                        break
+                    back_substitute(factors, blend, 0.0, mend)
+                sign = 1.0 if evaluation == 0 else -1.0
                 for s in range(n):
                     for j in range(3):
-                        trial[s, j] += mend[s, j]
+                        trial[s, j] += sign * mend[s, j]
             if accepted:
                 break
             whole = False
