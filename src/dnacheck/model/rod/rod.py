@@ -113,7 +113,7 @@ def _fit_breaks(n_steps: int, options: RodOptions) -> Array:
     """Ends of the spline's pieces, from -padding to N + 1 + padding."""
     first, last = -float(options.padding), float(n_steps + 1 + options.padding)
     if options.interval_span == "padded":
-        return np.asarray(np.linspace(first, last, options.intervals + 1), dtype=float)
+        return first + (last - first) / options.intervals * np.arange(options.intervals + 1.0)
     spacing = (n_steps + 1) / options.intervals
     before = int(np.ceil(options.padding / spacing - 1e-9))
     inner = spacing * np.arange(-before, options.intervals + before + 1)

@@ -1,0 +1,189 @@
+"""Newton's method on the condensed collocation system, at fixed parameters."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from dnacheck.numerics.rotations import rotation_log
+from dnacheck.ring.continuum.kernels.condense import COLUMNS, condense
+
+CONVERGED = 0
+NOT_FINITE = 1
+ITERATION_LIMIT = 2
+SINGULAR = 3
+
+
+@njit(cache=True, nogil=True)
+def solve_small(a: Any, x: Any) -> float:
+    """Solve ``a`` (n, n) in place for ``x`` (n, c), full pivoting; return the pivot ratio.
+
+    The ratio of the smallest to the largest pivot is 0 when the matrix is singular.
+    """
+    n = a.shape[0]
+    cols = x.shape[1]
+    order = np.arange(n)
+    largest = 0.0
+    smallest = math.inf
+    for c in range(n):
+        bi = c
+        bj = c
+        size = -1.0
+        for i in range(c, n):
+            for j in range(c, n):
+                if abs(a[i, j]) > size:
+                    size = abs(a[i, j])
+                    bi = i
+                    bj = j
+        if not size > 0.0 or not math.isfinite(size):
+            return 0.0
+        largest = max(largest, size)
+        smallest = min(smallest, size)
+        for j in range(n):
+            a[c, j], a[bi, j] = a[bi, j], a[c, j]
+        for j in range(cols):
+            x[c, j], x[bi, j] = x[bi, j], x[c, j]
+        for i in range(n):
+            a[i, c], a[i, bj] = a[i, bj], a[i, c]
+        order[c], order[bj] = order[bj], order[c]
+        for i in range(c + 1, n):
+            f = a[i, c] / a[c, c]
+            for j in range(c, n):
+                a[i, j] -= f * a[c, j]
+            for j in range(cols):
+                x[i, j] -= f * x[c, j]
+    y = np.empty((n, cols))
+    for i in range(n - 1, -1, -1):
+        for j in range(cols):
+            total = x[i, j]
+            for c in range(i + 1, n):
+                total -= a[i, c] * y[c, j]
+            y[i, j] = total / a[i, i]
+    for i in range(n):
+        for j in range(cols):
+            x[order[i], j] = y[i, j]
+    return smallest / largest
+
+
+@njit(cache=True, nogil=True)
+def closure_defect(frame: Any, centre: Any, alpha: float, out: Any) -> float:
+    """What the end must still move by: rotation vector and translation, (6,); returns its size.
+
+    The end conditions are those of (4.11): centre at the origin, frame turned by alpha about e3.
+    """
+    ca = math.cos(alpha)
+    sa = math.sin(alpha)
+    miss = np.empty((3, 3))
+    for j in range(3):
+        miss[0, j] = ca * frame[j, 0] - sa * frame[j, 1]
+        miss[1, j] = sa * frame[j, 0] + ca * frame[j, 1]
+        miss[2, j] = frame[j, 2]
+    rotation_log(miss, out[:3])
+    size = 0.0
+    for i in range(3):
+        out[3 + i] = -centre[i]
+    for i in range(6):
+        size = max(size, abs(out[i]))
+    return size
+
+
+@njit(cache=True, nogil=True)
+def newton(
+    slopes: Any,
+    loads: Any,
+    rod: Any,
+    rod_rate: Any,
+    alpha: float,
+    h: Any,
+    a: Any,
+    b: Any,
+    tolerance: float,
+    largest_turn: float,
+    max_iterations: int,
+    frames: Any,
+    centres: Any,
+    sensitivity: Any,
+    stage_sensitivity: Any,
+    parts: Any,
+) -> tuple[int, int, float, float]:
+    """Newton iterations from ``slopes`` and ``loads``, which are overwritten.
+
+    A step is shortened so that no mesh frame turns by more than ``largest_turn`` radians.
+
+    Returns
+    -------
+    code : int
+        0 converged, 1 not finite, 2 iteration limit, 3 singular.
+    iterations : int
+    residual : float
+        Larger of the relative collocation residual and the closure defect, at the returned state.
+    pivot_ratio : float
+        Smallest over largest pivot of the last 6 x 6 closure matrix.
+    """
+    n_intervals = slopes.shape[0]
+    k = slopes.shape[1]
+    end = np.empty(6)
+    matrix = np.empty((6, 6))
+    step = np.empty((6, 1))
+    ratio = 1.0
+    residual = math.inf
+    for iteration in range(max_iterations + 1):
+        code, residual = condense(
+            slopes,
+            loads,
+            rod,
+            rod_rate,
+            h,
+            a,
+            b,
+            frames,
+            centres,
+            sensitivity,
+            stage_sensitivity,
+            parts,
+        )
+        if code != 0:
+            return NOT_FINITE, iteration, math.inf, ratio
+        residual = max(
+            residual, closure_defect(frames[n_intervals], centres[n_intervals], alpha, end)
+        )
+        if not math.isfinite(residual):
+            return NOT_FINITE, iteration, residual, ratio
+        if residual <= tolerance:
+            return CONVERGED, iteration, residual, ratio
+        if iteration == max_iterations:
+            break
+        last = sensitivity[n_intervals]
+        for r in range(6):
+            for c in range(6):
+                matrix[r, c] = last[r, c]
+            step[r, 0] = end[r] - last[r, COLUMNS - 1]
+        ratio = solve_small(matrix, step)
+        if ratio == 0.0:
+            return SINGULAR, iteration, residual, ratio
+        turn = 0.0
+        for i in range(1, n_intervals + 1):
+            square = 0.0
+            for r in range(3):
+                total = sensitivity[i, r, COLUMNS - 1]
+                for c in range(6):
+                    total += sensitivity[i, r, c] * step[c, 0]
+                square += total * total
+            turn = max(turn, square)
+        turn = math.sqrt(turn)
+        if not math.isfinite(turn):
+            return NOT_FINITE, iteration, residual, ratio
+        scale = 1.0 if turn <= largest_turn else largest_turn / turn
+        for c in range(6):
+            loads[c] += scale * step[c, 0]
+        for i in range(n_intervals):
+            for j in range(k):
+                for r in range(3):
+                    total = stage_sensitivity[i, j, r, COLUMNS - 1]
+                    for c in range(6):
+                        total += stage_sensitivity[i, j, r, c] * step[c, 0]
+                    slopes[i, j, r] += scale * total
+    return ITERATION_LIMIT, max_iterations, residual, ratio
