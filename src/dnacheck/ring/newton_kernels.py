@@ -11,14 +11,12 @@ from numba import njit
 from dnacheck.model.chain_kernels import fill_angles
 from dnacheck.numerics.rotations import rotation_exp
 from dnacheck.ring.closure_kernels import (
-    back_substitute,
     closure_residual,
     energy_gradient,
-    factorise,
     lagrangian_residual,
     linearise,
-    solve_small,
 )
+from dnacheck.ring.sweep_kernels import FACTOR_WIDTH, back_substitute, factorise, solve_small
 
 CONVERGED = 0
 ITERATION_LIMIT = 1
@@ -138,7 +136,7 @@ def newton(
     new_axes = np.empty((n, 3, 3))
     new_gradient = np.empty((n, 3))
     gradient = np.empty((n, 3))
-    factors = np.empty((n, 48))
+    factors = np.empty((n, FACTOR_WIDTH))
     small = np.empty((6, 7))
     step = np.empty((n, 3))
     mend = np.empty((n, 3))
