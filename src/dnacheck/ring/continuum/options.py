@@ -33,8 +33,8 @@ class ContinuumOptions:
     largest_turn : float
         A Newton step is shortened so that no frame turns by more than this, in radians.
     homotopy_steps : int
-        Bound on the steps in gamma, the fraction of the intrinsic curvature, when Newton's method
-        fails from the rolled perfect ring; 0 switches the homotopy off.
+        Bound on the steps of each path (see ``homotopy``) that is tried when Newton's method fails
+        from the rolled perfect ring; 0 switches the paths off.
     writhe_points : int
         Corners of the polygon whose writhe selects the link.
     """

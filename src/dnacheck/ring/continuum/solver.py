@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
 from dnacheck.model.rod.rod import Rod
 from dnacheck.numerics.outcome import Status
 from dnacheck.ring.continuum.collocation import aligned_mesh, bisect, discretise
+from dnacheck.ring.continuum.homotopy import detours
 from dnacheck.ring.continuum.kernels import newton as kernel
-from dnacheck.ring.continuum.kernels.writhe import polygon_writhe
 from dnacheck.ring.continuum.options import ContinuumOptions
 from dnacheck.ring.continuum.ring import ContinuumRing
 from dnacheck.ring.continuum.state import (
@@ -20,6 +22,7 @@ from dnacheck.ring.continuum.state import (
     start_from_perfect_ring,
     transfer,
 )
+from dnacheck.ring.topology_kernels import polygon_writhe
 
 Array = NDArray[np.float64]
 
@@ -27,8 +30,11 @@ _STATUS = {
     kernel.CONVERGED: Status.CONVERGED,
     kernel.NOT_FINITE: Status.NOT_FINITE,
     kernel.ITERATION_LIMIT: Status.ITERATION_LIMIT,
-    kernel.SINGULAR: Status.SINGULAR,
+    kernel.NEUTRAL_MODE: Status.SINGULAR,
 }
+
+#: Statuses of a state that satisfies the equations.
+SOLVED = (Status.CONVERGED, Status.SADDLE, Status.SINGULAR, Status.MESH_LIMIT)
 
 # Energies are compared with at least this fraction of the flat ring's, so that a rod that closes
 # by itself, with energy zero, has a scale.
@@ -41,10 +47,13 @@ _CARRIED = 0.99
 def solve_continuum_ring(
     rod: Rod,
     link: int,
-    roll: float | None = None,
+    turn: float = 0.0,
     options: ContinuumOptions | None = None,
 ) -> ContinuumRing:
     """Equilibrium ring of a rod, started from the rolled perfect ring.
+
+    Newton starts from the perfect ring (4.12) in the register that first-order perturbation in
+    the intrinsic curvature selects; if that fails, the paths of ``homotopy`` are tried.
 
     Parameters
     ----------
@@ -52,80 +61,61 @@ def solve_continuum_ring(
     link : int
         Wanted linking number; sets alpha = Omega(1) - Omega(0) + 2 pi link. An equilibrium far
         from planar can have another link of the same parity, which is then reported.
-    roll : float, optional
-        Register of the start in radians; default: the one that first-order perturbation selects.
+    turn : float
+        Angle in radians by which the start's register differs from the selected one; pi is the
+        register that raises the energy most, and usually leads to a saddle.
     options : ContinuumOptions, optional
 
     Returns
     -------
     ContinuumRing
-        Check ``status``: what did not converge is returned too, with its residual.
+        Check ``status``: what did not converge is returned too, with its residual. SADDLE is an
+        equilibrium with negative directions; SINGULAR a solution to tolerance that is not
+        isolated, of which any member of the family may have been returned.
     """
     options = ContinuumOptions() if options is None else options
+    ring: ContinuumRing | None = None
+    for ring in attempts(rod, link, turn, options):
+        if ring.status in SOLVED:
+            break
+    assert ring is not None
+    return ring
+
+
+def attempts(
+    rod: Rod, link: int, turn: float, options: ContinuumOptions, detour: bool = True
+) -> Iterator[ContinuumRing]:
+    """Rings from one start by Newton, then by each path of ``homotopy``, converged or not."""
     alpha = rod.end_rotation + 2.0 * np.pi * link
     disc = discretise(rod, aligned_mesh(rod.breaks, options.intervals), options.degree)
     state = new_state(disc)
-    if roll is None:
-        roll = register_roll(disc, alpha)
-    start_from_perfect_ring(state, alpha, roll)
-    converged = run_newton(state, disc.coefficients(), alpha, options)
-    if not converged and state.code != kernel.SINGULAR:
-        converged = _homotopy(state, alpha, roll, options)
-    if not converged:
-        return _finish(state, alpha, _STATUS[state.code], options)
-    return refine(state, alpha, options)
+    start_from_perfect_ring(state, alpha, register_roll(disc, alpha) + turn)
+    if run_newton(state, disc.coefficients(), alpha, options):
+        yield refine(state, alpha, options)
+    else:
+        yield _finish(state, alpha, _STATUS[state.code], options)
+    if not detour or options.homotopy_steps == 0:
+        return
+    for converged in detours(state, alpha, turn, options):
+        if converged:
+            yield refine(state, alpha, options)
+        else:
+            yield _finish(state, alpha, _STATUS[state.code], options)
 
 
 def refine(state: State, alpha: float, options: ContinuumOptions) -> ContinuumRing:
     """Adapt the mesh of a converged state as the options ask, and freeze the result."""
     if not options.adapt:
-        return _finish(state, alpha, Status.CONVERGED, options)
+        return _finish(state, alpha, _STATUS[state.code], options)
     state, energy_error, shape_error = _adapt(state, alpha, options)
     reached = energy_error <= options.energy_tolerance * _energy_scale(state)
-    status = Status.CONVERGED if reached else Status.MESH_LIMIT
+    status = _STATUS[state.code] if reached else Status.MESH_LIMIT
     return _finish(state, alpha, status, options, energy_error, shape_error)
 
 
 def _energy_scale(state: State) -> float:
     flat = 0.5 * state.disc.rod.bend_stiffness * (2.0 * np.pi) ** 2
     return max(state.energy, _ENERGY_FLOOR * flat)
-
-
-def _homotopy(state: State, alpha: float, roll: float, options: ContinuumOptions) -> bool:
-    """From the rolled perfect ring at gamma = 0 to the rod at gamma = 1.
-
-    Each step starts from the tangent in gamma; it is halved on failure and grows on success.
-    """
-    full = state.disc.coefficients()
-    rates = np.zeros_like(full)
-    rates[..., :2] = full[..., :2]
-    start_from_perfect_ring(state, alpha, roll)
-    good = (state.slopes.copy(), state.loads.copy())
-    gamma, step = 0.0, 0.1
-    tangent: tuple[Array, Array] | None = None
-    for _ in range(options.homotopy_steps):
-        step = min(step, 1.0 - gamma)
-        state.slopes[:], state.loads[:] = good
-        if tangent is not None:
-            state.slopes += step * tangent[0]
-            state.loads += step * tangent[1]
-        before = state.iterations
-        if run_newton(state, state.disc.coefficients(gamma + step), alpha, options, rates):
-            gamma += step
-            good = (state.slopes.copy(), state.loads.copy())
-            if gamma >= 1.0:
-                return True
-            last = state.sensitivity[-1]
-            change = -np.linalg.solve(last[:, :6], last[:, 6])
-            by_gamma = state.stage_sensitivity[..., 6]
-            tangent = state.stage_sensitivity[..., :6] @ change + by_gamma, change
-            if state.iterations - before <= 4:
-                step *= 1.6
-        else:
-            step *= 0.5
-            if step < 1e-4:
-                break
-    return False
 
 
 def _adapt(state: State, alpha: float, options: ContinuumOptions) -> tuple[State, float, float]:
@@ -164,7 +154,8 @@ def _conjugate_points(state: State) -> int | None:
     under closure (Manning, Rogers & Maddocks, Proc. R. Soc. A 454, 3047 (1998)). Two zeros
     between neighbouring mesh points are not seen.
     """
-    signs, logarithms = np.linalg.slogdet(state.sensitivity[1:, :, :6])
+    end = -1 if state.code == kernel.NEUTRAL_MODE else None  # the zero at s = 1 is not inside
+    signs, logarithms = np.linalg.slogdet(state.sensitivity[1:end, :, :6])
     if not np.all(np.isfinite(logarithms)):
         return None
     return int(np.count_nonzero(signs[1:] != signs[:-1]))
@@ -184,7 +175,7 @@ def _finish(
     link, writhe = 0, float("nan")
     conjugate: int | None = None
     bend, twist, total_twist = (float(x) for x in state.parts.sum(axis=0))
-    if status in (Status.CONVERGED, Status.MESH_LIMIT):
+    if status in SOLVED:
         corners = np.arange(options.writhe_points) / options.writhe_points
         _, polygon, _ = state.evaluate(corners, quaternions)
         # w3hat = 0: D1 turns by the integral of u3, d1 by Omega(1) - Omega(0) less
@@ -192,6 +183,12 @@ def _finish(
         link = int(np.rint(turns + polygon_writhe(polygon)))
         writhe = link - turns
         conjugate = _conjugate_points(state)
+        if status is Status.CONVERGED and conjugate:
+            status = Status.SADDLE
+    # a neutral direction leaves open whether the energy rises along it
+    stable = None if conjugate is None else conjugate == 0
+    if status is Status.SINGULAR and stable:
+        stable = None
     arrays = {
         "loads": state.loads.copy(),
         "mesh": state.disc.mesh,
@@ -210,7 +207,7 @@ def _finish(
         link=link,
         writhe=writhe,
         end_moment=float(state.loads[2]),
-        stable=None if conjugate is None else conjugate == 0,
+        stable=stable,
         conjugate_points=conjugate,
         residual=state.residual,
         energy_error=energy_error,

@@ -20,9 +20,6 @@ from dnacheck.ring.continuum.options import ContinuumOptions
 
 Array = NDArray[np.float64]
 
-# Below this ratio of pivots the closure equations don't fix the solution: a zero mode.
-_SINGULAR_RATIO = 1e-13
-
 
 @dataclass
 class State:
@@ -161,9 +158,7 @@ def run_newton(
         state.parts,
     )
     state.iterations += iterations
-    if state.code == kernel.CONVERGED and state.pivot_ratio < _SINGULAR_RATIO:
-        state.code = kernel.SINGULAR
-    return state.code == kernel.CONVERGED
+    return state.code in (kernel.CONVERGED, kernel.NEUTRAL_MODE)
 
 
 def transfer(state: State, mesh: Array) -> State:

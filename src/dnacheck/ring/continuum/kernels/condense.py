@@ -33,7 +33,7 @@ FINE = 0
 NOT_FINITE = 1
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def cayley(g0: float, g1: float, g2: float, out: Any) -> float:
     """Write the rotation of the Gibbs vector g into ``out`` (3, 3); return 2 / (1 + g.g)."""
     f = 2.0 / (1.0 + g0 * g0 + g1 * g1 + g2 * g2)
@@ -49,7 +49,7 @@ def cayley(g0: float, g1: float, g2: float, out: Any) -> float:
     return f
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def multiply(a: Any, b: Any, out: Any) -> None:
     """Write the product of two (3, 3) matrices into ``out``."""
     for i in range(3):
@@ -57,7 +57,7 @@ def multiply(a: Any, b: Any, out: Any) -> None:
             out[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def factor_in_place(a: Any, n: int, pivots: Any) -> bool:
     """LU factors of the leading n x n block with row pivoting; False if singular."""
     for c in range(n):
@@ -83,7 +83,7 @@ def factor_in_place(a: Any, n: int, pivots: Any) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def solve_columns(a: Any, n: int, pivots: Any, x: Any) -> None:
     """Overwrite ``x`` (n, COLUMNS) with the solution, given the output of the factorisation."""
     for c in range(n):
@@ -106,7 +106,7 @@ def solve_columns(a: Any, n: int, pivots: Any, x: Any) -> None:
             x[r, j] *= f
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def condense(
     slopes: Any,
     loads: Any,

@@ -11,7 +11,7 @@ from numba import njit
 from dnacheck.ring.continuum.kernels.condense import cayley
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def mesh_quaternions(slopes: Any, h: Any, b: Any, out: Any) -> None:
     """Write the quaternions (K + 1, 4) at the mesh points, continuous from (0, 0, 0, 1)."""
     out[0, 0] = out[0, 1] = out[0, 2] = 0.0
@@ -25,7 +25,7 @@ def mesh_quaternions(slopes: Any, h: Any, b: Any, out: Any) -> None:
         apply_gibbs(g0, g1, g2, out[i], out[i + 1])
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def apply_gibbs(g0: float, g1: float, g2: float, q: Any, out: Any) -> None:
     """Write the quaternion of C(g) times that of ``q`` into ``out``."""
     f = 1.0 / math.sqrt(1.0 + g0 * g0 + g1 * g1 + g2 * g2)
@@ -36,7 +36,7 @@ def apply_gibbs(g0: float, g1: float, g2: float, q: Any, out: Any) -> None:
     out[3] = f * (w - g0 * x - g1 * y - g2 * z)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def evaluate(
     s: Any,
     mesh: Any,
@@ -121,7 +121,7 @@ def evaluate(
         apply_gibbs(g[0], g[1], g[2], quaternions[i], q_out[e])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def slopes_on_mesh(
     mesh: Any, c: Any, q_mesh: Any, q_points: Any, u_points: Any, slopes: Any
 ) -> None:

@@ -11,23 +11,36 @@ from numba import njit
 from dnacheck.numerics.rotations import rotation_log
 from dnacheck.ring.continuum.kernels.condense import COLUMNS, condense
 
+#: Below this ratio of pivots of the closure matrix at a solution a direction counts as neutral.
+NEUTRAL = 1e-10
+#: Below this ratio a direction is left out of a step that it would make too large: on the way to a
+#: neutral solution the matrix is only as singular as the residual is small.
+_SOFT = 1e-5
+
+#: A neutral direction comes with a conserved quantity that makes one closure equation redundant;
+#: the discretisation satisfies it to its own accuracy only, so this much may be left over.
+_NEUTRAL_RESIDUAL = 1e-6
+
 CONVERGED = 0
 NOT_FINITE = 1
 ITERATION_LIMIT = 2
-SINGULAR = 3
+NEUTRAL_MODE = 3
 
 
-@njit(cache=True, nogil=True)
-def solve_small(a: Any, x: Any) -> float:
+@njit(cache=True, nogil=True, error_model="numpy")
+def solve_small(a: Any, x: Any, neutral: float) -> float:
     """Solve ``a`` (n, n) in place for ``x`` (n, c), full pivoting; return the pivot ratio.
 
-    The ratio of the smallest to the largest pivot is 0 when the matrix is singular.
+    The ratio of the smallest to the largest pivot measures how nearly singular the matrix is.
+    Where a pivot falls below ``neutral`` times the largest, the unknowns left are set to zero:
+    a neutral direction, such as the register of a straight rod, takes no step.
     """
     n = a.shape[0]
     cols = x.shape[1]
     order = np.arange(n)
     largest = 0.0
     smallest = math.inf
+    rank = n
     for c in range(n):
         bi = c
         bj = c
@@ -38,10 +51,13 @@ def solve_small(a: Any, x: Any) -> float:
                     size = abs(a[i, j])
                     bi = i
                     bj = j
-        if not size > 0.0 or not math.isfinite(size):
+        if not math.isfinite(size):
             return 0.0
         largest = max(largest, size)
         smallest = min(smallest, size)
+        if not size > neutral * largest:
+            rank = c
+            break
         for j in range(n):
             a[c, j], a[bi, j] = a[bi, j], a[c, j]
         for j in range(cols):
@@ -55,20 +71,20 @@ def solve_small(a: Any, x: Any) -> float:
                 a[i, j] -= f * a[c, j]
             for j in range(cols):
                 x[i, j] -= f * x[c, j]
-    y = np.empty((n, cols))
-    for i in range(n - 1, -1, -1):
+    y = np.zeros((n, cols))
+    for i in range(rank - 1, -1, -1):
         for j in range(cols):
             total = x[i, j]
-            for c in range(i + 1, n):
+            for c in range(i + 1, rank):
                 total -= a[i, c] * y[c, j]
             y[i, j] = total / a[i, i]
     for i in range(n):
         for j in range(cols):
             x[order[i], j] = y[i, j]
-    return smallest / largest
+    return smallest / largest if largest > 0.0 else 0.0
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def closure_defect(frame: Any, centre: Any, alpha: float, out: Any) -> float:
     """What the end must still move by: rotation vector and translation, (6,); returns its size.
 
@@ -90,7 +106,33 @@ def closure_defect(frame: Any, centre: Any, alpha: float, out: Any) -> float:
     return size
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
+def _step(last: Any, end: Any, neutral: float, matrix: Any, step: Any) -> float:
+    """Write the change of the loads that closes the linearised ring into ``step`` (6, 1)."""
+    for r in range(6):
+        for c in range(6):
+            matrix[r, c] = last[r, c]
+        step[r, 0] = end[r] - last[r, COLUMNS - 1]
+    return solve_small(matrix, step, neutral)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _largest_turn(sensitivity: Any, step: Any) -> float:
+    """Largest rotation of a mesh frame in a step, radians."""
+    largest = 0.0
+    for i in range(1, sensitivity.shape[0]):
+        square = 0.0
+        for r in range(3):
+            total = sensitivity[i, r, COLUMNS - 1]
+            for c in range(6):
+                total += sensitivity[i, r, c] * step[c, 0]
+            square += total * total
+        if not square <= largest:
+            largest = square
+    return math.sqrt(largest)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def newton(
     slopes: Any,
     loads: Any,
@@ -116,7 +158,7 @@ def newton(
     Returns
     -------
     code : int
-        0 converged, 1 not finite, 2 iteration limit, 3 singular.
+        0 converged, 1 not finite, 2 iteration limit, 3 converged but not isolated.
     iterations : int
     residual : float
         Larger of the relative collocation residual and the closure defect, at the returned state.
@@ -152,30 +194,22 @@ def newton(
         )
         if not math.isfinite(residual):
             return NOT_FINITE, iteration, residual, ratio
+        last = sensitivity[n_intervals]
+        ratio = _step(last, end, NEUTRAL, matrix, step)
         if residual <= tolerance:
+            if ratio <= NEUTRAL:
+                return NEUTRAL_MODE, iteration, residual, ratio
             return CONVERGED, iteration, residual, ratio
         if iteration == max_iterations:
             break
-        last = sensitivity[n_intervals]
-        for r in range(6):
-            for c in range(6):
-                matrix[r, c] = last[r, c]
-            step[r, 0] = end[r] - last[r, COLUMNS - 1]
-        ratio = solve_small(matrix, step)
-        if ratio == 0.0:
-            return SINGULAR, iteration, residual, ratio
-        turn = 0.0
-        for i in range(1, n_intervals + 1):
-            square = 0.0
-            for r in range(3):
-                total = sensitivity[i, r, COLUMNS - 1]
-                for c in range(6):
-                    total += sensitivity[i, r, c] * step[c, 0]
-                square += total * total
-            turn = max(turn, square)
-        turn = math.sqrt(turn)
+        turn = _largest_turn(sensitivity, step)
+        if turn > largest_turn and ratio < _SOFT:
+            _step(last, end, _SOFT, matrix, step)
+            turn = _largest_turn(sensitivity, step)
         if not math.isfinite(turn):
             return NOT_FINITE, iteration, residual, ratio
+        if ratio <= NEUTRAL and turn <= tolerance and residual <= _NEUTRAL_RESIDUAL:
+            return NEUTRAL_MODE, iteration, residual, ratio
         scale = 1.0 if turn <= largest_turn else largest_turn / turn
         for c in range(6):
             loads[c] += scale * step[c, 0]

@@ -8,7 +8,7 @@ from typing import Any
 from numba import njit
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def rolled_ring(
     alpha: float,
     roll: float,
@@ -67,7 +67,7 @@ def rolled_ring(
     loads[5] = 0.0
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def overlap(alpha: float, points: Any, weights: Any, strains: Any) -> tuple[float, float]:
     """Real and imaginary part of the integral of (w1hat + i w2hat) exp(i alpha s).
 
