@@ -1,0 +1,1 @@
+"""Families of continuum rings: pseudo-arclength continuation, branch points, diagrams."""
