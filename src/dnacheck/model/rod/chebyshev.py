@@ -45,7 +45,7 @@ def differentiate(coefficients: Array) -> Array:
     return np.asarray(np.polynomial.chebyshev.chebder(coefficients, axis=1), dtype=float)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def evaluate_series(s: Any, breaks: Any, coefficients: Any, out: Any) -> None:
     """Evaluate piecewise Chebyshev series by Clenshaw's recurrence.
 

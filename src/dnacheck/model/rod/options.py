@@ -29,9 +29,9 @@ class RodOptions:
     padding : int
         Base pairs added cyclically at each end before filtering and fitting.
     interval_span : {"molecule", "padded"}
-        What the ``intervals`` divide. "molecule": the N + 1 steps of the molecule (the padding
-        gets pieces of the same length); "padded": the padded length. See :mod:`dnacheck.model.rod`
-        for which of the two the paper's figures support.
+        What the ``intervals`` divide. "padded", which the paper's Figure 10 supports (see
+        :mod:`dnacheck.model.rod`): the padded length; "molecule": the N + 1 steps of the molecule,
+        with pieces of the same length in the padding.
     chebyshev_points : int
         Points per spline piece on which arclength, natural frame and strains are represented.
     condition_limit : float

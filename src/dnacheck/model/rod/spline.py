@@ -35,7 +35,7 @@ class PiecewisePolynomial:
     rms_residual: float
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def basis_values(x: Any, knots: Any, degree: int, rows: Any, first: Any) -> None:
     """B-spline values by the Cox-de Boor recursion.
 

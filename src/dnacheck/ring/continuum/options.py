@@ -43,7 +43,7 @@ class ContinuumOptions:
     degree: int = 4
     adapt: bool = True
     energy_tolerance: float = 1e-6
-    max_intervals: int = 480
+    max_intervals: int = 2000
     tolerance: float = 1e-10
     max_iterations: int = 30
     largest_turn: float = 1.0

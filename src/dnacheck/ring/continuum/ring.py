@@ -48,6 +48,8 @@ class ContinuumRing:
         before the last and so pessimistic; None where no second mesh was solved.
     iterations : int
         Newton iterations altogether.
+    seconds : float
+        Wall-clock time of the solve.
     mesh : ndarray, shape (K + 1,)
     slopes : ndarray, shape (K, k, 3)
         Rates of the local Gibbs vector at the Gauss points, the solver's own unknowns.
@@ -72,6 +74,7 @@ class ContinuumRing:
     energy_error: float | None
     shape_error: float | None
     iterations: int
+    seconds: float
     mesh: Array
     slopes: Array
     quaternions: Array

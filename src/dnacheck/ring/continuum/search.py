@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,8 +18,10 @@ from dnacheck.ring.continuum.solver import SOLVED, attempts
 # differ by far more.
 _SAME = 1e-5
 
-# With links = "auto" the search grows by a link at a time while the lowest ring sits at its edge.
-_WIDEST = 6
+# Minima this far above the lowest, in RT, change the J factor by less than a part in a thousand.
+_WINDOW_RT = 8.0
+_ALL_LINKS_REACH = 2
+_ALL_REGISTERS = 8
 
 
 @dataclass(frozen=True)
@@ -56,24 +58,47 @@ class ContinuumSearch:
         return self.equilibria[0]
 
 
+def candidate_links(rod: Rod) -> tuple[int, ...]:
+    """Links that "auto" searches, nearest to the relaxed twist first.
+
+    The two around the relaxed twist, and every other whose twisting energy as a flat ring stays
+    within 8 RT or half the bending energy of a circle.
+    """
+    turns = rod.relaxed_turns
+    allowed = max(_WINDOW_RT / rod.energy_scale_RT, np.pi**2 * rod.bend_stiffness)
+    reach = float(np.sqrt(2.0 * allowed / rod.twist_stiffness)) / (2.0 * np.pi)
+    around = range(int(np.floor(turns - reach)), int(np.ceil(turns + reach)) + 1)
+    return tuple(
+        sorted(
+            (link for link in around if abs(link - turns) <= max(reach, 1.0)),
+            key=lambda link: abs(link - turns),
+        )
+    )
+
+
 def lowest_continuum_ring(
     rod: Rod,
     links: str | int | Iterable[int] = "auto",
     options: ContinuumOptions | None = None,
-    registers: int = 2,
+    registers: int | None = None,
 ) -> ContinuumSearch:
     """Search links and registers for continuum rings.
+
+    Each link starts from the perfect ring in the register that first-order perturbation prefers;
+    where Newton's method finds no minimum from there the paths of ``homotopy`` are tried, and
+    where they find none either, the other registers get the same treatment. Links whose minimum
+    lies within 8 RT of the lowest also start from the other registers, by Newton's method alone:
+    that finds second minima and the saddle between registers.
 
     Parameters
     ----------
     rod : Rod
     links : "auto", "all", int or iterable of int
-        "auto": the two links nearest to the relaxed twist, and more while the lowest ring is
-        found at the edge of what was tried; "all": five links around the relaxed twist.
+        "auto": :func:`candidate_links`; "all": those and five links around the relaxed twist.
     options : ContinuumOptions, optional
-    registers : int
-        Rolls per link, evenly spaced from the one that first-order perturbation prefers; 2 are
-        that one and its opposite.
+    registers : int, optional
+        Rolls per link, evenly spaced from the preferred one. Default 2 (the preferred one and
+        its opposite) for "auto", 8 otherwise.
 
     Raises
     ------
@@ -81,59 +106,61 @@ def lowest_continuum_ring(
         ``links`` is none of the above, or ``registers`` is not positive.
     """
     options = ContinuumOptions() if options is None else options
+    wanted = _wanted_links(rod, links)
+    if registers is None:
+        registers = 2 if links == "auto" else _ALL_REGISTERS
     if registers < 1:
         raise InputError(f"registers = {registers}: give at least 1")
-    relaxed = rod.relaxed_turns
-    nearest = int(np.rint(relaxed))
-    grow = False
-    if isinstance(links, str):
-        if links == "auto":
-            first = int(np.floor(relaxed))
-            wanted = [first, first + 1]
-            grow = True
-        elif links == "all":
-            wanted = list(range(nearest - 2, nearest + 3))
-        else:
-            raise InputError(f"links = {links!r}: 'auto', 'all' or an integer")
-    elif isinstance(links, Iterable):
-        wanted = [int(link) for link in links]
-    else:
-        wanted = [int(links)]
-    wanted.sort(key=lambda link: abs(link - relaxed))
+    turns = 2.0 * np.pi / registers * np.arange(registers)
     found: list[ContinuumRing] = []
     failures: list[ContinuumRing] = []
-    tried: list[int] = []
-    while wanted:
-        link = wanted.pop(0)
-        tried.append(link)
-        # A far link can't be the lowest unless a near one was, so it gets no second chance.
-        near = abs(link - relaxed) < 1.0 or not grow
-        for ring in _from_link(rod, link, registers, near, options):
-            if ring.status not in SOLVED:
-                failures.append(ring)
-            elif not any(_same(ring, other) for other in found):
-                found.append(ring)
-        if grow and not wanted and found and len(tried) < _WIDEST:
-            best = min(found, key=lambda ring: ring.energy).link
-            if best <= min(tried):
-                wanted.append(min(tried) - 1)
-            elif best >= max(tried):
-                wanted.append(max(tried) + 1)
+    pending: dict[int, list[float]] = {}
+    for link in wanted:
+        # Registers in turn, with detours, until one of them gives a minimum.
+        pending[link] = list(turns)
+        while pending[link]:
+            if _collect(attempts(rod, link, pending[link].pop(0), options), found, failures):
+                break
+    for link in wanted:
+        here = [ring.energy for ring in found if ring.link == link and ring.stable is not False]
+        window = _WINDOW_RT / rod.energy_scale_RT
+        if not here or min(here) > min(ring.energy for ring in found) + window:
+            continue
+        for turn in pending[link]:
+            _collect(attempts(rod, link, turn, options, detour=False), found, failures)
     found.sort(key=lambda ring: ring.energy)
     status = Status.CONVERGED if found else Status.NOT_FOUND
-    return ContinuumSearch(tuple(found), tuple(failures), tuple(tried), status)
+    return ContinuumSearch(tuple(found), tuple(failures), tuple(wanted), status)
 
 
-def _from_link(
-    rod: Rod, link: int, registers: int, detour: bool, options: ContinuumOptions
-) -> Iterator[ContinuumRing]:
-    """Rings of one link from every register; the preferred one insists on a minimum."""
-    for j in range(registers):
-        turn = 2.0 * np.pi * j / registers
-        for ring in attempts(rod, link, turn, options, detour and j == 0):
-            yield ring
-            if ring.status in SOLVED and ring.stable is not False:
-                break
+def _wanted_links(rod: Rod, links: str | int | Iterable[int]) -> list[int]:
+    if isinstance(links, str):
+        if links not in ("auto", "all"):
+            raise InputError(f"links = {links!r}: 'auto', 'all' or an integer")
+        chosen = set(candidate_links(rod))
+        if links == "all":
+            nearest = int(np.rint(rod.relaxed_turns))
+            chosen |= set(range(nearest - _ALL_LINKS_REACH, nearest + _ALL_LINKS_REACH + 1))
+    elif isinstance(links, Iterable):
+        chosen = {int(link) for link in links}
+    else:
+        chosen = {int(links)}
+    return sorted(chosen, key=lambda link: abs(link - rod.relaxed_turns))
+
+
+def _collect(
+    rings: Iterable[ContinuumRing], found: list[ContinuumRing], failures: list[ContinuumRing]
+) -> bool:
+    """Sort rings into the lists until one is not unstable; True if there was one."""
+    for ring in rings:
+        if ring.status not in SOLVED:
+            failures.append(ring)
+            continue
+        if not any(_same(ring, other) for other in found):
+            found.append(ring)
+        if ring.stable is not False:
+            return True
+    return False
 
 
 def _same(a: ContinuumRing, b: ContinuumRing) -> bool:

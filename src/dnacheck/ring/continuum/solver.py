@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -213,6 +214,7 @@ def _finish(
         energy_error=energy_error,
         shape_error=shape_error,
         iterations=state.iterations,
+        seconds=time.perf_counter() - state.began,
         status=status,
         **arrays,
     )

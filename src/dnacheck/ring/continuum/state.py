@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,6 +37,8 @@ class State:
     stage_sensitivity : ndarray, shape (K, k, 3, COLUMNS)
     parts : ndarray, shape (K, 3)
         Bending energy, twisting energy and integral of u3 of each interval.
+    began : float
+        Time at which the work on this state started, by ``time.perf_counter``.
     code : int
         How the last solve ended, in the terms of ``kernels.newton``.
     """
@@ -52,6 +55,7 @@ class State:
     residual: float = np.inf
     pivot_ratio: float = 1.0
     iterations: int = 0
+    began: float = 0.0
 
     @property
     def energy(self) -> float:
@@ -97,6 +101,7 @@ def new_state(disc: Discretisation) -> State:
         sensitivity=np.zeros((n + 1, 6, COLUMNS)),
         stage_sensitivity=np.empty((n, k, 3, COLUMNS)),
         parts=np.full((n, 3), np.nan),
+        began=time.perf_counter(),
     )
 
 
@@ -171,4 +176,5 @@ def transfer(state: State, mesh: Array) -> State:
     slopes_on_mesh(mesh, disc.rule.points, at_mesh, at_points, u, new.slopes)
     new.loads[:] = state.loads
     new.iterations = state.iterations
+    new.began = state.began
     return new

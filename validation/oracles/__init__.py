@@ -1,0 +1,1 @@
+"""Independent solvers that the package's own are compared with."""
