@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from dnacheck.numerics.rotations import wedge_angles, wedge_rotation
+from dnacheck.numerics.rotations import NEAR_SINGULAR, wedge_angles, wedge_rotation
+from dnacheck.numerics.trigonometry import arctangents
 
 WEDGE = 0
 MIDSTEP = 1
@@ -81,23 +82,45 @@ def fill_frames(angles: Any, form: int, centres: Any, frames: Any) -> None:
             orthonormalise(frames[s + 1])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def fill_angles(frames: Any, form: int, angles: Any) -> None:
     """Write the step angles (N, 3) between successive frames (N+1, 3, 3)."""
     n = angles.shape[0]
     relative = np.empty((3, 3))
-    for s in range(n):
-        for i in range(3):
-            for j in range(3):
-                relative[i, j] = (
-                    frames[s, 0, i] * frames[s + 1, 0, j]
-                    + frames[s, 1, i] * frames[s + 1, 1, j]
-                    + frames[s, 2, i] * frames[s + 1, 2, j]
-                )
-        if form == WEDGE:
-            angles[s, 0], angles[s, 1], angles[s, 2] = wedge_angles(relative)
-        else:
+    if form != WEDGE:
+        for s in range(n):
+            _relative_rotation(frames, s, relative)
             angles[s, 0], angles[s, 1], angles[s, 2] = midstep_angles(relative)
+        return
+    # The entries of wedge_angles, gathered for one pass over all arctangents.
+    y = np.empty((n, 3))
+    x = np.empty((n, 3))
+    flat = False
+    for s in range(n):
+        _relative_rotation(frames, s, relative)
+        cosine = math.sqrt(relative[2, 0] ** 2 + relative[2, 2] ** 2)
+        y[s, 0], x[s, 0] = -relative[0, 1], relative[1, 1]
+        y[s, 1], x[s, 1] = -relative[2, 1], cosine
+        y[s, 2], x[s, 2] = -relative[2, 0], relative[2, 2]
+        flat = flat or cosine < NEAR_SINGULAR
+    arctangents(y.reshape(3 * n), x.reshape(3 * n), angles.reshape(3 * n))
+    if flat:
+        for s in range(n):
+            if x[s, 1] < NEAR_SINGULAR:
+                _relative_rotation(frames, s, relative)
+                angles[s, 0], angles[s, 1], angles[s, 2] = wedge_angles(relative)
+
+
+@njit(cache=True, nogil=True)
+def _relative_rotation(frames: Any, s: int, out: Any) -> None:
+    """Frame s+1 seen from frame s, into ``out`` (3, 3)."""
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = (
+                frames[s, 0, i] * frames[s + 1, 0, j]
+                + frames[s, 1, i] * frames[s + 1, 1, j]
+                + frames[s, 2, i] * frames[s + 1, 2, j]
+            )
 
 
 @njit(cache=True, nogil=True)

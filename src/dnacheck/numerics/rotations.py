@@ -16,6 +16,9 @@ from numba import njit
 # Below this squared angle the Taylor series of the exponential is exact to round-off.
 _SMALL_ANGLE_SQUARED = 1e-8
 
+NEAR_SINGULAR = 1e-12
+"""cos(theta) below which the wedge angles tau and phi are not separate any more."""
+
 
 @njit(cache=True, nogil=True)
 def wedge_rotation(tau: float, theta: float, phi: float, out: Any) -> None:
@@ -47,7 +50,7 @@ def wedge_angles(rotation: Any) -> tuple[float, float, float]:
     """
     cos_theta = math.hypot(rotation[2, 0], rotation[2, 2])
     theta = math.atan2(-rotation[2, 1], cos_theta)
-    if cos_theta < 1e-12:
+    if cos_theta < NEAR_SINGULAR:
         tau = math.atan2(rotation[1, 0], rotation[0, 0])
         return tau, theta, 0.0
     tau = math.atan2(-rotation[0, 1], rotation[1, 1])

@@ -11,7 +11,6 @@ e_k = b_k x force + a_k x moment / 2: a diagonal plus a semi-separable matrix of
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -19,29 +18,9 @@ from numba import njit
 
 from dnacheck.model.chain_kernels import WEDGE, orthonormalise
 from dnacheck.numerics.rotations import rotation_log
+from dnacheck.numerics.trigonometry import sines_and_cosines
 
 _ORTHONORMALISE_EVERY = 64
-
-
-@njit(cache=True, nogil=True, fastmath={"contract"})
-def _midstep_axes(tau: float, theta: float, phi: float, frame: Any, out: Any) -> None:
-    """Axes (5, 3) of tau/2, theta/2, phi, theta/2, tau/2 carried by ``frame`` (3, 3)."""
-    ct, st = math.cos(0.5 * tau), math.sin(0.5 * tau)
-    ch, sh = math.cos(0.5 * theta), math.sin(0.5 * theta)
-    cp, sp = math.cos(phi), math.sin(phi)
-    for i in range(3):
-        d1, d2, d3 = frame[i, 0], frame[i, 1], frame[i, 2]
-        x1 = ct * d1 + st * d2
-        y1 = -st * d1 + ct * d2
-        y2 = ch * y1 - sh * d3
-        z2 = sh * y1 + ch * d3
-        x3 = cp * x1 - sp * z2
-        z3 = sp * x1 + cp * z2
-        out[0, i] = d3
-        out[1, i] = -x1
-        out[2, i] = y2
-        out[3, i] = -x3
-        out[4, i] = sh * y2 + ch * z3
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
@@ -54,50 +33,55 @@ def linearise(angles: Any, form: int, centres: Any, frames: Any, axes: Any, halv
     form : 0 for the wedge (2.1), 1 for the symmetrised mid-step product.
     centres, frames, axes : (N+1, 3), (N+1, 3, 3), (N, 3, 3), filled.
         ``axes[i, j]`` is the laboratory axis of angle j of step i.
-    halves : (N, 5, 3) for the mid-step form, else empty; filled with its elementary axes.
+    halves : (N, 5, 3) for the mid-step form, else empty; filled with the axes of its elementary
+        turns tau/2, theta/2, phi, theta/2, tau/2.
     """
     n = angles.shape[0]
+    turns = angles.copy()
+    if form != WEDGE:
+        for s in range(n):
+            turns[s, 0] *= 0.5
+            turns[s, 1] *= 0.5
+    cosines = np.empty((n, 3))
+    sines = np.empty((n, 3))
+    sines_and_cosines(turns.reshape(3 * n), sines.reshape(3 * n), cosines.reshape(3 * n))
     for i in range(3):
         centres[0, i] = 0.0
         for j in range(3):
             frames[0, i, j] = 1.0 if i == j else 0.0
     for s in range(n):
-        if form == WEDGE:
-            ct, st = math.cos(angles[s, 0]), math.sin(angles[s, 0])
-            ch, sh = math.cos(angles[s, 1]), math.sin(angles[s, 1])
-            cp, sp = math.cos(angles[s, 2]), math.sin(angles[s, 2])
-            for i in range(3):
-                d1, d2, d3 = frames[s, i, 0], frames[s, i, 1], frames[s, i, 2]
-                x1 = ct * d1 + st * d2
-                y1 = -st * d1 + ct * d2
-                y2 = ch * y1 - sh * d3
-                z2 = sh * y1 + ch * d3
+        ct, st = cosines[s, 0], sines[s, 0]
+        ch, sh = cosines[s, 1], sines[s, 1]
+        cp, sp = cosines[s, 2], sines[s, 2]
+        for i in range(3):
+            d1, d2, d3 = frames[s, i, 0], frames[s, i, 1], frames[s, i, 2]
+            x1 = ct * d1 + st * d2
+            y1 = ct * d2 - st * d1
+            y2 = ch * y1 - sh * d3
+            z2 = sh * y1 + ch * d3
+            x3 = cp * x1 - sp * z2
+            z3 = sp * x1 + cp * z2
+            centres[s + 1, i] = centres[s, i] + d3
+            axes[s, 2, i] = y2
+            if form == WEDGE:
                 axes[s, 0, i] = d3
                 axes[s, 1, i] = -x1
-                axes[s, 2, i] = y2
-                frames[s + 1, i, 0] = cp * x1 - sp * z2
+                frames[s + 1, i, 0] = x3
                 frames[s + 1, i, 1] = y2
-                frames[s + 1, i, 2] = sp * x1 + cp * z2
-                centres[s + 1, i] = centres[s, i] + d3
-        else:
-            _midstep_axes(angles[s, 0], angles[s, 1], angles[s, 2], frames[s], halves[s])
-            ct, st = math.cos(0.5 * angles[s, 0]), math.sin(0.5 * angles[s, 0])
-            ch, sh = math.cos(0.5 * angles[s, 1]), math.sin(0.5 * angles[s, 1])
-            for i in range(3):
-                d3 = halves[s, 0, i]
-                x3 = -halves[s, 3, i]
-                y2 = halves[s, 2, i]
-                z4 = halves[s, 4, i]
-                # y after the second half bend, from z4 = sh y2 + ch z3.
-                z3 = (z4 - sh * y2) / ch
+                frames[s + 1, i, 2] = z3
+            else:
                 y4 = ch * y2 - sh * z3
+                z4 = sh * y2 + ch * z3
                 axes[s, 0, i] = 0.5 * (d3 + z4)
-                axes[s, 1, i] = 0.5 * (halves[s, 1, i] + halves[s, 3, i])
-                axes[s, 2, i] = y2
+                axes[s, 1, i] = -0.5 * (x1 + x3)
                 frames[s + 1, i, 0] = ct * x3 + st * y4
-                frames[s + 1, i, 1] = -st * x3 + ct * y4
+                frames[s + 1, i, 1] = ct * y4 - st * x3
                 frames[s + 1, i, 2] = z4
-                centres[s + 1, i] = centres[s, i] + d3
+                halves[s, 0, i] = d3
+                halves[s, 1, i] = -x1
+                halves[s, 2, i] = y2
+                halves[s, 3, i] = -x3
+                halves[s, 4, i] = z4
         if (s + 1) % _ORTHONORMALISE_EVERY == 0:
             orthonormalise(frames[s + 1])
 

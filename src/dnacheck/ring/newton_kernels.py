@@ -9,14 +9,14 @@ import numpy as np
 from numba import njit
 
 from dnacheck.model.chain_kernels import fill_angles
-from dnacheck.numerics.rotations import rotation_exp
 from dnacheck.ring.closure_kernels import (
     closure_residual,
     energy_gradient,
     lagrangian_residual,
     linearise,
 )
-from dnacheck.ring.sweep_kernels import FACTOR_WIDTH, back_substitute, factorise, solve_small
+from dnacheck.ring.schur_kernels import solve_small
+from dnacheck.ring.sweep_kernels import FACTOR_WIDTH, back_substitute, factorise
 
 CONVERGED = 0
 ITERATION_LIMIT = 1
@@ -72,22 +72,25 @@ def _retract(
                 turn[i] += axes[s, j, i] * step[s, j]
             mean[i] += turn[i] / n
     turned = np.empty((n + 1, 3, 3))
-    rotation = np.empty((3, 3))
     for i in range(3):
-        turn[i] = -fraction * mean[i]
+        turn[i] = -mean[i]
+    half = 0.5 * fraction
     for s in range(n + 1):
-        rotation_exp(turn, rotation)
-        for i in range(3):
-            for j in range(3):
-                turned[s, i, j] = (
-                    rotation[i, 0] * frames[s, 0, j]
-                    + rotation[i, 1] * frames[s, 1, j]
-                    + rotation[i, 2] * frames[s, 2, j]
-                )
+        # Cayley's rotation by c: v -> v + 2/(1 + c.c) c x (v + c x v), near exp(2 c).
+        c0, c1, c2 = half * turn[0], half * turn[1], half * turn[2]
+        factor = 2.0 / (1.0 + c0 * c0 + c1 * c1 + c2 * c2)
+        for j in range(3):
+            v0, v1, v2 = frames[s, 0, j], frames[s, 1, j], frames[s, 2, j]
+            x0 = v0 + c1 * v2 - c2 * v1
+            x1 = v1 + c2 * v0 - c0 * v2
+            x2 = v2 + c0 * v1 - c1 * v0
+            turned[s, 0, j] = v0 + factor * (c1 * x2 - c2 * x1)
+            turned[s, 1, j] = v1 + factor * (c2 * x0 - c0 * x2)
+            turned[s, 2, j] = v2 + factor * (c0 * x1 - c1 * x0)
         if s < n:
             for i in range(3):
                 for j in range(3):
-                    turn[i] += fraction * axes[s, j, i] * step[s, j]
+                    turn[i] += axes[s, j, i] * step[s, j]
     fill_angles(turned, form, out)
     for s in range(n):
         close = True
@@ -156,6 +159,18 @@ def newton(
     linearise(angles, form, centres, frames, axes, halves)
     energy = energy_gradient(angles, ground, stiffness, gradient)
     closure_residual(centres, frames, closure)
+    known = False
+    for i in range(6):
+        known = known or multipliers[i] != 0.0
+    if not known:
+        factorise(
+            gradient, stiffness, 0.0, form, centres, axes, halves, multipliers, factors, small
+        )
+        for i in range(6):
+            rhs[i] = closure[i] - small[i, 6]
+        if solve_small(small, rhs, length, target)[0] >= 0:
+            for i in range(6):
+                multipliers[i] = target[i]
     for iteration in range(max_iterations + 1):
         figures[ITERATIONS] = iteration
         stationarity = lagrangian_residual(gradient, centres, axes, multipliers)

@@ -7,13 +7,8 @@ from numpy.typing import NDArray
 
 from dnacheck.model.chain import Chain
 from dnacheck.ring.closure_kernels import energy_gradient, linearise
-from dnacheck.ring.sweep_kernels import (
-    FACTOR_WIDTH,
-    back_substitute,
-    eliminate,
-    factorise,
-    solve_small,
-)
+from dnacheck.ring.schur_kernels import solve_small
+from dnacheck.ring.sweep_kernels import FACTOR_WIDTH, back_substitute, eliminate, factorise
 
 Array = NDArray[np.float64]
 

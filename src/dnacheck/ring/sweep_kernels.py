@@ -2,10 +2,11 @@
 
 Between an earlier angle j and a later one k the Hessian is a_j . e_k (see
 :mod:`dnacheck.ring.closure_kernels`), plus the stiffness within a step. Its block L D L^T is one
-sweep with a 3 x 3 matrix P: per step D = diagonal block - E P E^T, Z = D^-1 (A - E P),
-P += (A - E P)^T Z, and L between steps is E Z^T, where the rows of A and E are the axes a and the
-couplings e of the step. The signs of the pivots and of the 6 x 6 Schur complement of closure give
-the inertia, their logarithms the log-determinant.
+sweep with a 3 x 3 matrix P: with the axes a and couplings e of a step in the rows of A and E,
+U = A - E P, D = diagonal block - E P E^T, P += U^T D^-1 U. The columns of the closure Jacobian
+(rotation A, displacement B) and the right-hand side are eliminated along; as the rotation columns
+are A itself, P ends as their Schur complement. The signs of the pivots and of the 6 x 6 Schur
+complement of closure give the inertia, their logarithms the log-determinant.
 """
 
 from __future__ import annotations
@@ -18,9 +19,68 @@ from numba import njit
 
 from dnacheck.model.chain_kernels import WEDGE
 
-FACTOR_WIDTH = 48
-"""Numbers kept per step: e, z, inverse pivot, eliminated displacement and rotation columns (9
-each) and the eliminated right-hand side (3)."""
+FACTOR_WIDTH = 36
+"""Numbers kept per step: E (9), Z = D^-1 U (9), eliminated displacement columns W (9), eliminated
+right-hand side (3) and the lower triangle of D^-1 (6)."""
+
+# Positions in a step's factors.
+_Z, _W, _G, _D = 9, 18, 27, 30
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def _cross(a: Any, b: Any) -> Any:
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def _dot(a: Any, b: Any) -> Any:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def _couple(a: Any, b: Any, force: Any, half: Any, held: float) -> Any:
+    """e = b x force + a x moment/2 + held a."""
+    c, d = _cross(b, force), _cross(a, half)
+    return c[0] + d[0] + held * a[0], c[1] + d[1] + held * a[1], c[2] + d[2] + held * a[2]
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def _less_product(a: Any, e: Any, m: Any) -> Any:
+    """a - e m for row vectors a, e and a matrix m given by its rows."""
+    return (
+        a[0] - (e[0] * m[0][0] + e[1] * m[1][0] + e[2] * m[2][0]),
+        a[1] - (e[0] * m[0][1] + e[1] * m[1][1] + e[2] * m[2][1]),
+        a[2] - (e[0] * m[0][2] + e[1] * m[1][2] + e[2] * m[2][2]),
+    )
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def _combine(c: Any, r0: Any, r1: Any, r2: Any) -> Any:
+    """c0 r0 + c1 r1 + c2 r2 for row vectors."""
+    return (
+        c[0] * r0[0] + c[1] * r1[0] + c[2] * r2[0],
+        c[0] * r0[1] + c[1] * r1[1] + c[2] * r2[1],
+        c[0] * r0[2] + c[1] * r1[2] + c[2] * r2[2],
+    )
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def _plus(a: Any, b: Any) -> Any:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def _vector(a: Any, i: int, j: int) -> Any:
+    return a[i, j, 0], a[i, j, 1], a[i, j, 2]
+
+
+@njit(cache=True, nogil=True)
+def _store(rows: Any, s: int, at: int, v: Any) -> None:
+    rows[s, at], rows[s, at + 1], rows[s, at + 2] = v[0], v[1], v[2]
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
@@ -77,8 +137,7 @@ def factorise(
         added to the Lagrangian (0 for the true Hessian). Between angles of steps s <= t it adds
         shift (N - t)/N a_s . a_t, which has the same semi-separable form, so it is free; it
         holds back rolling and reorientation, which the elastic energy hardly resists.
-    factors : (N, 48), filled: e (9), z (9), inverse pivot (9), then the eliminated columns of
-        displacement (9), rotation (9) and gradient (3) of each step.
+    factors : (N, FACTOR_WIDTH), filled.
     small : (6, 7), filled: G H^-1 G^T and, in the last column, G H^-1 gradient.
 
     Returns
@@ -88,270 +147,169 @@ def factorise(
     weakest : smallest relative pivot determinant, a measure of the sweep's stability.
     """
     n = axes.shape[0]
-    m = multipliers
-    p = np.zeros((3, 3))
-    sb = np.zeros((3, 3))
-    sg = np.zeros(3)
-    e = np.empty((3, 3))
-    u = np.empty((3, 3))
-    w = np.empty((3, 3))
-    wg = np.empty(3)
-    z = np.empty((3, 3))
-    d = np.empty((3, 3))
-    inv = np.empty((3, 3))
-    ep = np.empty((3, 3))
+    force = (multipliers[0], multipliers[1], multipliers[2])
+    half = (0.5 * multipliers[3], 0.5 * multipliers[4], 0.5 * multipliers[5])
+    end = (centres[n, 0], centres[n, 1], centres[n, 2])
+    zero = (0.0, 0.0, 0.0)
+    # Running sums over steps: U^T D^-1 U, U^T D^-1 W, U^T D^-1 g, W^T D^-1 W, W^T D^-1 g.
+    p0, p1, p2 = zero, zero, zero
+    q0, q1, q2 = zero, zero, zero
+    r = zero
+    t0, t1, t2 = zero, zero, zero
+    v = zero
+    block = np.empty((3, 3))
     negatives = 0
     log_pivots = 0.0
+    product = 1.0
     weakest = 1e300
-    for i in range(6):
-        for j in range(7):
-            small[i, j] = 0.0
-    rx, ry, rz = centres[n, 0], centres[n, 1], centres[n, 2]
     for s in range(n):
-        x, y, zz = rx - centres[s + 1, 0], ry - centres[s + 1, 1], rz - centres[s + 1, 2]
         held = shift * (n - s) / n
-        for k in range(3):
-            a0, a1, a2 = axes[s, k, 0], axes[s, k, 1], axes[s, k, 2]
-            b0 = a1 * zz - a2 * y
-            b1 = a2 * x - a0 * zz
-            b2 = a0 * y - a1 * x
-            e0 = b1 * m[2] - b2 * m[1] + 0.5 * (a1 * m[5] - a2 * m[4]) + held * a0
-            e1 = b2 * m[0] - b0 * m[2] + 0.5 * (a2 * m[3] - a0 * m[5]) + held * a1
-            e2 = b0 * m[1] - b1 * m[0] + 0.5 * (a0 * m[4] - a1 * m[3]) + held * a2
-            e[k, 0], e[k, 1], e[k, 2] = e0, e1, e2
-            for j in range(3):
-                ep[k, j] = e0 * p[0, j] + e1 * p[1, j] + e2 * p[2, j]
-            u[k, 0], u[k, 1], u[k, 2] = a0 - ep[k, 0], a1 - ep[k, 1], a2 - ep[k, 2]
-            w[k, 0] = b0 - (e0 * sb[0, 0] + e1 * sb[1, 0] + e2 * sb[2, 0])
-            w[k, 1] = b1 - (e0 * sb[0, 1] + e1 * sb[1, 1] + e2 * sb[2, 1])
-            w[k, 2] = b2 - (e0 * sb[0, 2] + e1 * sb[1, 2] + e2 * sb[2, 2])
-            wg[k] = gradient[s, k] - (e0 * sg[0] + e1 * sg[1] + e2 * sg[2])
+        d = (end[0] - centres[s + 1, 0], end[1] - centres[s + 1, 1], end[2] - centres[s + 1, 2])
+        a0, a1, a2 = _vector(axes, s, 0), _vector(axes, s, 1), _vector(axes, s, 2)
+        b0, b1, b2 = _cross(a0, d), _cross(a1, d), _cross(a2, d)
+        e0 = _couple(a0, b0, force, half, held)
+        e1 = _couple(a1, b1, force, half, held)
+        e2 = _couple(a2, b2, force, half, held)
+        p, q = (p0, p1, p2), (q0, q1, q2)
+        u0, u1, u2 = _less_product(a0, e0, p), _less_product(a1, e1, p), _less_product(a2, e2, p)
+        w0, w1, w2 = _less_product(b0, e0, q), _less_product(b1, e1, q), _less_product(b2, e2, q)
+        g = (
+            gradient[s, 0] - _dot(e0, r),
+            gradient[s, 1] - _dot(e1, r),
+            gradient[s, 2] - _dot(e2, r),
+        )
+        # The block within a step is a_j . e_k for j <= k, so that with -e_j P e_k it is u_j . e_k.
+        d00, d10, d11 = _dot(u0, e0), _dot(u0, e1), _dot(u1, e1)
+        d20, d21, d22 = _dot(u0, e2), _dot(u1, e2), _dot(u2, e2)
         if form != WEDGE:
-            _midstep_block(halves[s], x, y, zz, m, d)
-        for k in range(3):
-            for j in range(k + 1):
-                if form == WEDGE:
-                    ae = axes[s, j, 0] * e[k, 0] + axes[s, j, 1] * e[k, 1]
-                    d[k, j] = ae + axes[s, j, 2] * e[k, 2]
-                else:
-                    aa = axes[s, j, 0] * axes[s, k, 0] + axes[s, j, 1] * axes[s, k, 1]
-                    d[k, j] += held * (aa + axes[s, j, 2] * axes[s, k, 2])
-                d[k, j] += stiffness[s, k, j] - (
-                    ep[k, 0] * e[j, 0] + ep[k, 1] * e[j, 1] + ep[k, 2] * e[j, 2]
-                )
-        c00 = d[1, 1] * d[2, 2] - d[2, 1] * d[2, 1]
-        c01 = d[2, 0] * d[2, 1] - d[1, 0] * d[2, 2]
-        c02 = d[1, 0] * d[2, 1] - d[1, 1] * d[2, 0]
-        det = d[0, 0] * c00 + d[1, 0] * c01 + d[2, 0] * c02
-        minor = d[0, 0] * d[1, 1] - d[1, 0] * d[1, 0]
-        if d[0, 0] < 0.0:
+            _midstep_block(halves[s], d[0], d[1], d[2], multipliers, block)
+            d00 += block[0, 0] + held * _dot(a0, a0) - _dot(a0, e0)
+            d10 += block[1, 0] + held * _dot(a0, a1) - _dot(a0, e1)
+            d11 += block[1, 1] + held * _dot(a1, a1) - _dot(a1, e1)
+            d20 += block[2, 0] + held * _dot(a0, a2) - _dot(a0, e2)
+            d21 += block[2, 1] + held * _dot(a1, a2) - _dot(a1, e2)
+            d22 += block[2, 2] + held * _dot(a2, a2) - _dot(a2, e2)
+        d00 += stiffness[s, 0, 0]
+        d10 += stiffness[s, 1, 0]
+        d11 += stiffness[s, 1, 1]
+        d20 += stiffness[s, 2, 0]
+        d21 += stiffness[s, 2, 1]
+        d22 += stiffness[s, 2, 2]
+        c0, c1, c2 = d11 * d22 - d21 * d21, d20 * d21 - d10 * d22, d10 * d21 - d11 * d20
+        det = d00 * c0 + d10 * c1 + d20 * c2
+        minor = d00 * d11 - d10 * d10
+        if d00 < 0.0:
             negatives += 1
-        if minor * d[0, 0] < 0.0:
+        if minor * d00 < 0.0:
             negatives += 1
         if det * minor < 0.0:
             negatives += 1
         size = stiffness[s, 0, 0] * stiffness[s, 1, 1] * stiffness[s, 2, 2]
-        weakest = min(weakest, abs(det) / size)
-        log_pivots += math.log(abs(det) + 1e-300)
+        if not abs(det) >= weakest * size:
+            weakest = abs(det) / size
+        product *= abs(det)
+        if not 1e-150 < product < 1e150:
+            log_pivots += math.log(product + 1e-300)
+            product = 1.0
         f = 1.0 / det
-        inv[0, 0] = f * c00
-        inv[0, 1] = inv[1, 0] = f * c01
-        inv[0, 2] = inv[2, 0] = f * c02
-        inv[1, 1] = f * (d[0, 0] * d[2, 2] - d[2, 0] * d[2, 0])
-        inv[1, 2] = inv[2, 1] = f * (d[1, 0] * d[2, 0] - d[0, 0] * d[2, 1])
-        inv[2, 2] = f * minor
-        for k in range(3):
-            for j in range(3):
-                z[k, j] = inv[k, 0] * u[0, j] + inv[k, 1] * u[1, j] + inv[k, 2] * u[2, j]
-        # Schur complement: rotation columns reuse z = inverse pivot times u.
-        for i in range(3):
-            wi0 = inv[0, 0] * w[0, i] + inv[0, 1] * w[1, i] + inv[0, 2] * w[2, i]
-            wi1 = inv[1, 0] * w[0, i] + inv[1, 1] * w[1, i] + inv[1, 2] * w[2, i]
-            wi2 = inv[2, 0] * w[0, i] + inv[2, 1] * w[1, i] + inv[2, 2] * w[2, i]
-            for j in range(i + 1):
-                small[i, j] += wi0 * w[0, j] + wi1 * w[1, j] + wi2 * w[2, j]
-                small[3 + i, 3 + j] += z[0, i] * u[0, j] + z[1, i] * u[1, j] + z[2, i] * u[2, j]
-            for j in range(3):
-                small[3 + j, i] += wi0 * u[0, j] + wi1 * u[1, j] + wi2 * u[2, j]
-            small[i, 6] += wi0 * wg[0] + wi1 * wg[1] + wi2 * wg[2]
-            small[3 + i, 6] += z[0, i] * wg[0] + z[1, i] * wg[1] + z[2, i] * wg[2]
-        for i in range(3):
-            for j in range(3):
-                sb[i, j] += z[0, i] * w[0, j] + z[1, i] * w[1, j] + z[2, i] * w[2, j]
-            for j in range(i + 1):
-                p[i, j] += u[0, i] * z[0, j] + u[1, i] * z[1, j] + u[2, i] * z[2, j]
-                p[j, i] = p[i, j]
-            sg[i] += z[0, i] * wg[0] + z[1, i] * wg[1] + z[2, i] * wg[2]
-        row = factors[s]
-        for k in range(3):
-            for j in range(3):
-                row[3 * k + j] = e[k, j]
-                row[9 + 3 * k + j] = z[k, j]
-                row[18 + 3 * k + j] = inv[k, j]
-                row[27 + 3 * k + j] = w[k, j]
-                row[36 + 3 * k + j] = u[k, j]
-            row[45 + k] = wg[k]
-    for i in range(6):
-        for j in range(i):
-            small[j, i] = small[i, j]
-    return negatives, log_pivots, weakest
+        i0 = (f * c0, f * c1, f * c2)
+        i1 = (i0[1], f * (d00 * d22 - d20 * d20), f * (d10 * d20 - d00 * d21))
+        i2 = (i0[2], i1[2], f * minor)
+        z0, z1, z2 = _combine(i0, u0, u1, u2), _combine(i1, u0, u1, u2), _combine(i2, u0, u1, u2)
+        p0 = _plus(p0, _combine((u0[0], u1[0], u2[0]), z0, z1, z2))
+        p1 = _plus(p1, _combine((u0[1], u1[1], u2[1]), z0, z1, z2))
+        p2 = _plus(p2, _combine((u0[2], u1[2], u2[2]), z0, z1, z2))
+        q0 = _plus(q0, _combine((z0[0], z1[0], z2[0]), w0, w1, w2))
+        q1 = _plus(q1, _combine((z0[1], z1[1], z2[1]), w0, w1, w2))
+        q2 = _plus(q2, _combine((z0[2], z1[2], z2[2]), w0, w1, w2))
+        r = _plus(r, _combine(g, z0, z1, z2))
+        y0, y1, y2 = _combine(i0, w0, w1, w2), _combine(i1, w0, w1, w2), _combine(i2, w0, w1, w2)
+        t0 = _plus(t0, _combine((w0[0], w1[0], w2[0]), y0, y1, y2))
+        t1 = _plus(t1, _combine((w0[1], w1[1], w2[1]), y0, y1, y2))
+        t2 = _plus(t2, _combine((w0[2], w1[2], w2[2]), y0, y1, y2))
+        v = _plus(v, _combine(g, y0, y1, y2))
+        _store(factors, s, 0, e0)
+        _store(factors, s, 3, e1)
+        _store(factors, s, 6, e2)
+        _store(factors, s, _Z, z0)
+        _store(factors, s, _Z + 3, z1)
+        _store(factors, s, _Z + 6, z2)
+        _store(factors, s, _W, w0)
+        _store(factors, s, _W + 3, w1)
+        _store(factors, s, _W + 6, w2)
+        _store(factors, s, _G, g)
+        _store(factors, s, _D, (i0[0], i1[0], i1[1]))
+        _store(factors, s, _D + 3, i2)
+    _store(small, 0, 0, t0)
+    _store(small, 1, 0, (t0[1], t1[1], t1[2]))
+    _store(small, 2, 0, (t0[2], t1[2], t2[2]))
+    _store(small, 3, 0, q0)
+    _store(small, 4, 0, q1)
+    _store(small, 5, 0, q2)
+    _store(small, 3, 3, p0)
+    _store(small, 4, 3, (p0[1], p1[1], p1[2]))
+    _store(small, 5, 3, (p0[2], p1[2], p2[2]))
+    for i in range(3):
+        small[i, 6], small[3 + i, 6] = v[i], r[i]
+        for j in range(3):
+            small[i, 3 + j] = small[3 + j, i]
+    return negatives, log_pivots + math.log(product), weakest
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def _row(factors: Any, s: int, at: int) -> Any:
+    return factors[s, at], factors[s, at + 1], factors[s, at + 2]
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def _divide_by_pivot(factors: Any, s: int, x: Any) -> Any:
+    """D^-1 x of one step."""
+    i00, i10, i11 = _row(factors, s, _D)
+    i20, i21, i22 = _row(factors, s, _D + 3)
+    return _dot((i00, i10, i20), x), _dot((i10, i11, i21), x), _dot((i20, i21, i22), x)
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
 def back_substitute(factors: Any, new_multipliers: Any, weight: float, step: Any) -> None:
     """Step (N, 3) = -H^-1 (weight gradient + G^T new multipliers) from :func:`factorise`."""
+    m = (new_multipliers[0], new_multipliers[1], new_multipliers[2])
+    t = (new_multipliers[3], new_multipliers[4], new_multipliers[5])
     n = factors.shape[0]
-    t0, t1, t2 = 0.0, 0.0, 0.0
-    m = new_multipliers
-    w = np.empty(3)
     for back in range(n):
         s = n - 1 - back
-        row = factors[s]
-        for k in range(3):
-            w[k] = -(
-                weight * row[45 + k]
-                + row[27 + 3 * k] * m[0]
-                + row[28 + 3 * k] * m[1]
-                + row[29 + 3 * k] * m[2]
-                + row[36 + 3 * k] * m[3]
-                + row[37 + 3 * k] * m[4]
-                + row[38 + 3 * k] * m[5]
-            )
-        for k in range(3):
-            step[s, k] = (
-                row[18 + 3 * k] * w[0]
-                + row[19 + 3 * k] * w[1]
-                + row[20 + 3 * k] * w[2]
-                - row[9 + 3 * k] * t0
-                - row[10 + 3 * k] * t1
-                - row[11 + 3 * k] * t2
-            )
-        for k in range(3):
-            t0 += row[3 * k] * step[s, k]
-            t1 += row[3 * k + 1] * step[s, k]
-            t2 += row[3 * k + 2] * step[s, k]
+        g = _row(factors, s, _G)
+        x = (
+            weight * g[0] + _dot(_row(factors, s, _W), m),
+            weight * g[1] + _dot(_row(factors, s, _W + 3), m),
+            weight * g[2] + _dot(_row(factors, s, _W + 6), m),
+        )
+        x = _divide_by_pivot(factors, s, x)
+        y = (
+            -x[0] - _dot(_row(factors, s, _Z), t),
+            -x[1] - _dot(_row(factors, s, _Z + 3), t),
+            -x[2] - _dot(_row(factors, s, _Z + 6), t),
+        )
+        _store(step, s, 0, y)
+        et = _combine(y, _row(factors, s, 0), _row(factors, s, 3), _row(factors, s, 6))
+        t = _plus(t, et)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def eliminate(factors: Any, rhs: Any, small: Any) -> None:
     """Replace the right-hand side (N, 3) that :func:`factorise` eliminated along the chain."""
-    s0, s1, s2 = 0.0, 0.0, 0.0
-    for i in range(6):
-        small[i, 6] = 0.0
+    r = (0.0, 0.0, 0.0)
+    v = (0.0, 0.0, 0.0)
     for s in range(factors.shape[0]):
-        row = factors[s]
-        for k in range(3):
-            row[45 + k] = rhs[s, k] - (
-                row[3 * k] * s0 + row[3 * k + 1] * s1 + row[3 * k + 2] * s2
-            )
-        for k in range(3):
-            s0 += row[9 + 3 * k] * row[45 + k]
-            s1 += row[10 + 3 * k] * row[45 + k]
-            s2 += row[11 + 3 * k] * row[45 + k]
-            scaled = (
-                row[18 + 3 * k] * row[45]
-                + row[19 + 3 * k] * row[46]
-                + row[20 + 3 * k] * row[47]
-            )
-            for i in range(3):
-                small[i, 6] += row[27 + 3 * k + i] * scaled
-    small[3, 6], small[4, 6], small[5, 6] = s0, s1, s2
-
-
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
-def solve_small(small: Any, rhs: Any, length: float, out: Any) -> tuple[int, float]:
-    """Solve the 6 x 6 Schur system and count its negative eigenvalues.
-
-    Symmetric elimination with pivots of size one or two (Bunch & Parlett). ``length`` scales
-    displacements so that the two kinds of rows compare. Returns the number of negative
-    eigenvalues of G H^-1 G^T and the logarithm of its absolute determinant (unscaled); the number
-    is -1 if the matrix is singular or not finite.
-    """
-    a = np.empty((6, 7))
-    top = 0.0
-    for i in range(6):
-        si = 1.0 / length if i < 3 else 1.0
-        for j in range(6):
-            a[i, j] = small[i, j] * si * (1.0 / length if j < 3 else 1.0)
-            if not math.isfinite(a[i, j]):
-                return -1, 0.0
-            top = max(top, abs(a[i, j]))
-        a[i, 6] = rhs[i] * si
-    order = np.arange(6)
-    sizes = np.ones(6, dtype=np.int64)
-    negatives = 0
-    log_det = 6.0 * math.log(length)
-    k = 0
-    while k < 6:
-        diagonal, off, d, oi, oj = -1.0, -1.0, k, k, k
-        for i in range(k, 6):
-            if abs(a[i, i]) > diagonal:
-                diagonal, d = abs(a[i, i]), i
-            for j in range(k, i):
-                if abs(a[i, j]) > off:
-                    off, oi, oj = abs(a[i, j]), i, j
-        if max(diagonal, off) <= 1e-15 * top:
-            return -1, 0.0
-        # (1 + sqrt 17) / 8 bounds the growth of the elements.
-        single = diagonal >= 0.6404 * off
-        if single:
-            _swap(a, order, k, d)
-        else:
-            _swap(a, order, k, oj)
-            _swap(a, order, k + 1, oi)
-        if single:
-            pivot = a[k, k]
-            negatives += 1 if pivot < 0.0 else 0
-            log_det += math.log(abs(pivot))
-            for i in range(k + 1, 6):
-                f = a[i, k] / pivot
-                for j in range(k + 1, 7):
-                    a[i, j] -= f * a[k, j]
-            k += 1
-        else:
-            sizes[k] = 2
-            det = a[k, k] * a[k + 1, k + 1] - a[k + 1, k] * a[k, k + 1]
-            if det < 0.0:
-                negatives += 1
-            elif a[k, k] < 0.0:
-                negatives += 2
-            log_det += math.log(abs(det))
-            for i in range(k + 2, 6):
-                f = (a[i, k] * a[k + 1, k + 1] - a[i, k + 1] * a[k + 1, k]) / det
-                g = (a[i, k + 1] * a[k, k] - a[i, k] * a[k, k + 1]) / det
-                for j in range(k + 2, 7):
-                    a[i, j] -= f * a[k, j] + g * a[k + 1, j]
-            k += 2
-    x = np.empty(6)
-    k = 5
-    while k >= 0:
-        if k > 0 and sizes[k - 1] == 2:
-            r0, r1 = a[k - 1, 6], a[k, 6]
-            for j in range(k + 1, 6):
-                r0 -= a[k - 1, j] * x[j]
-                r1 -= a[k, j] * x[j]
-            det = a[k - 1, k - 1] * a[k, k] - a[k, k - 1] * a[k - 1, k]
-            x[k - 1] = (r0 * a[k, k] - r1 * a[k - 1, k]) / det
-            x[k] = (r1 * a[k - 1, k - 1] - r0 * a[k, k - 1]) / det
-            k -= 2
-        else:
-            r0 = a[k, 6]
-            for j in range(k + 1, 6):
-                r0 -= a[k, j] * x[j]
-            x[k] = r0 / a[k, k]
-            k -= 1
-    for i in range(6):
-        out[order[i]] = x[i] * (1.0 / length if order[i] < 3 else 1.0)
-    return negatives, log_det
-
-
-@njit(cache=True, nogil=True, fastmath={"contract"})
-def _swap(a: Any, order: Any, i: int, j: int) -> None:
-    """Exchange rows and columns i and j of a symmetric system (6, 7) and of its order."""
-    if i == j:
-        return
-    for c in range(7):
-        a[i, c], a[j, c] = a[j, c], a[i, c]
-    for r in range(6):
-        a[r, i], a[r, j] = a[r, j], a[r, i]
-    order[i], order[j] = order[j], order[i]
+        g = (
+            rhs[s, 0] - _dot(_row(factors, s, 0), r),
+            rhs[s, 1] - _dot(_row(factors, s, 3), r),
+            rhs[s, 2] - _dot(_row(factors, s, 6), r),
+        )
+        _store(factors, s, _G, g)
+        y = _divide_by_pivot(factors, s, g)
+        z0, z1, z2 = _row(factors, s, _Z), _row(factors, s, _Z + 3), _row(factors, s, _Z + 6)
+        w0, w1, w2 = _row(factors, s, _W), _row(factors, s, _W + 3), _row(factors, s, _W + 6)
+        r = _plus(r, _combine(g, z0, z1, z2))
+        v = _plus(v, _combine(y, w0, w1, w2))
+    for i in range(3):
+        small[i, 6], small[3 + i, 6] = v[i], r[i]
