@@ -1,0 +1,205 @@
+"""``dnacheck diagram``: bifurcation diagrams of a molecule or of the perfect rod."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from dnacheck.commands.common import (
+    ContinuumSettings,
+    ModelSettings,
+    RunSettings,
+    common_options,
+    continuum_options,
+    model_options,
+    target_argument,
+)
+from dnacheck.commands.output import note, print_json
+
+if TYPE_CHECKING:
+    from dnacheck.ring.continuation.component import Component
+
+EXIT_NOT_CONVERGED = 3
+
+
+@click.command(
+    epilog="Example:  dnacheck diagram 11T15 --plot diagram.png;  dnacheck diagram perfect"
+)
+@target_argument
+@click.option(
+    "--bounds",
+    type=(float, float),
+    default=None,
+    metavar="FIRST LAST",
+    help="End twist alpha between which branches are followed, in turns.",
+)
+@click.option(
+    "--start",
+    type=float,
+    default=None,
+    metavar="TURNS",
+    help="End twist to start from, in turns.  [default: the lowest ring's; perfect: 0.08]",
+)
+@click.option(
+    "--components",
+    "search",
+    is_flag=True,
+    help="Start from sixteen rolled rings, to find components beside the lowest ring's.",
+)
+@click.option(
+    "--max-points",
+    type=click.IntRange(min=1),
+    default=3000,
+    show_default=True,
+    help="Points per branch and direction.",
+)
+@click.option(
+    "--bp", "n_bp", type=click.IntRange(min=4), default=158, show_default=True,
+    help="Base pairs of the perfect rod.",
+)  # fmt: skip
+@click.option("--plot", type=click.Path(path_type=Path), default=None, help="Write a picture.")
+@model_options
+@continuum_options
+@common_options
+def command(
+    target: str,
+    bounds: tuple[float, float] | None,
+    start: float | None,
+    search: bool,
+    max_points: int,
+    n_bp: int,
+    plot: Path | None,
+    model: ModelSettings,
+    continuum: ContinuumSettings,
+    run: RunSettings,
+) -> int | None:
+    """Bifurcation diagram of TARGET: energy and end moment of its rings against end twist.
+
+    TARGET may be "perfect", the straight uniform rod of Figure 6. Rings whose sugar-phosphate
+    chains close are marked; stable stretches are those without conjugate points.
+    """
+    from dnacheck.ring.continuation.branch import BranchError
+    from dnacheck.ring.continuation.figures import component_data
+
+    try:
+        found = _components(
+            target, bounds, start, search, max_points, n_bp, model, continuum
+        )
+    except BranchError as error:
+        return _failed(target, error, run)
+    data = [component_data(component) for component in found]
+    if plot is not None:
+        _draw(plot, target, found, data)
+        note(f"picture written to {plot}", run.quiet or run.json)
+    if run.json:
+        print_json({"target": target, "components": data})
+    else:
+        for record in data:
+            _print(record)
+    complete = all(record["ok"] for record in data)
+    if not complete:
+        for record in data:
+            if not record["ok"]:
+                note(record["status"], run.quiet)
+    return None if complete else EXIT_NOT_CONVERGED
+
+
+def _components(
+    target: str,
+    bounds: tuple[float, float] | None,
+    start: float | None,
+    search: bool,
+    max_points: int,
+    n_bp: int,
+    model: ModelSettings,
+    continuum: ContinuumSettings,
+) -> tuple[Component, ...]:
+    import math
+    from dataclasses import replace
+
+    from dnacheck.model.chain import build_chain
+    from dnacheck.model.molecules import read_targets
+    from dnacheck.model.rod import RodOptions, build_rod
+    from dnacheck.numerics.outcome import InputError
+    from dnacheck.ring.continuation import diagram
+    from dnacheck.ring.continuation.follow import Bounds
+    from dnacheck.ring.continuation.options import ContinuationOptions
+    from dnacheck.ring.continuation.parameters import perfect_rod
+
+    turn = 2.0 * math.pi
+    limits = None if bounds is None else Bounds(turn * bounds[0], turn * bounds[1])
+    alpha = None if start is None else turn * start
+    if target == "perfect":
+        rod = perfect_rod(n_bp, model.twist_ratio, model.persistence_length, model.rise)
+        options = replace(diagram.PERFECT, max_points=max_points)
+        if search:
+            raise InputError("the perfect diagram is connected: leave out --components")
+        return (diagram.perfect_diagram(rod, 0.5 if alpha is None else alpha, limits, options),)
+    molecules = list(read_targets(target))
+    if len(molecules) != 1:
+        raise InputError(f"a diagram is of one molecule, '{target}' holds {len(molecules)}")
+    molecule = molecules[0]
+    if isinstance(molecule, InputError):
+        raise molecule
+    chain = build_chain(molecule, **model.chain_arguments())
+    rod = build_rod(
+        chain,
+        RodOptions(
+            filter_width=continuum.filter_width,
+            intervals=continuum.intervals,
+            degree=continuum.degree,
+        ),
+    )
+    options = ContinuationOptions(max_points=max_points)
+    if search:
+        return diagram.components(rod, None, limits or Bounds(-5 * math.pi, 5 * math.pi), options)
+    if alpha is not None:
+        return (diagram.imperfect_component(rod, alpha, bounds=limits, options=options),)
+    return (diagram.lowest_component(rod, limits, options),)
+
+
+def _failed(target: str, error: Exception, run: RunSettings) -> int:
+    if run.json:
+        print_json({"target": target, "components": [], "status": str(error)})
+    note(str(error), False)
+    return EXIT_NOT_CONVERGED
+
+
+def _print(record: dict[str, Any]) -> None:
+    for branch in record["branches"]:
+        values = branch["alpha"]
+        click.echo(
+            f"branch of {len(values)} points, end twist {values.min():.4f} to {values.max():.4f} "
+            f"turns, energy {branch['energy'].min():.4f} to {branch['energy'].max():.4f} RT, "
+            f"residual below {branch['residual'].max():.1e}: {branch['status']}"
+        )
+        for point in branch["special"]:
+            directions = point["negative_directions"]
+            stable = {0: "stable", -1: ""}.get(directions, f"{directions} negative directions")
+            click.echo(
+                f"  {point['kind']:12} alpha = {point['value'] / 6.283185307179586:12.8f} turns  "
+                f"energy {point['energy']:10.5f} RT  m3(0) {point['end_moment']:9.4f} RT  {stable}"
+            )
+
+
+def _draw(
+    path: Path, target: str, found: tuple[Component, ...], data: list[dict[str, Any]]
+) -> None:
+    from dnacheck.commands.pictures import save_figure
+    from dnacheck.ring.continuation.figures import marked_rings, ring_shape
+    from dnacheck.validate.plots import continuation as plots
+
+    branches = [branch for record in data for branch in record["branches"]]
+    rings = [] if target == "perfect" else [ring_shape(r) for r in marked_rings(found[0])[:2]]
+
+    def draw(figure: Any) -> None:
+        grid = figure.add_gridspec(1 + len(rings[:1]), 2, height_ratios=[1.3, 1.0][: 1 + len(rings[:1])])
+        plots.diagram(figure.add_subplot(grid[0, 0]), {"branches": branches, "title": target})
+        plots.diagram_by_twist(figure.add_subplot(grid[0, 1]), {"branches": branches})
+        for i, ring in enumerate(rings):
+            title = f"link {ring['link']}, {ring['energy']:.2f} RT"
+            plots.ring_ribbon(figure.add_subplot(grid[1, i]), {**ring, "title": title})
+
+    save_figure(path, (9.0, 8.0 if rings else 4.5), draw)
