@@ -1,0 +1,86 @@
+"""The search for the lowest continuum ring."""
+
+import numpy as np
+import pytest
+from rods import ANGLE_SETS, molecule_rod, random_chain, straight_chain
+
+from dnacheck.model.rod import build_rod
+from dnacheck.numerics.outcome import InputError, SolveError, Status
+from dnacheck.ring.continuum import ContinuumOptions, lowest_continuum_ring
+from dnacheck.ring.search import find_rings
+
+
+def test_equilibria_are_sorted_distinct_and_stable_first():
+    search = lowest_continuum_ring(molecule_rod("09T09"), links="all")
+    energies = [ring.energy for ring in search.equilibria]
+    assert energies == sorted(energies)
+    assert np.min(np.diff(energies)) > 1e-6
+    assert search.lowest.stable
+    assert {14, 15} <= {ring.link for ring in search.equilibria}
+    assert any(ring.status is Status.SADDLE for ring in search.equilibria)
+
+
+def test_one_link_only():
+    search = lowest_continuum_ring(molecule_rod("09T09"), links=15)
+    assert search.links == (15,)
+    assert search.lowest.link == 15
+    assert search.lowest.energy > lowest_continuum_ring(molecule_rod("09T09")).lowest.energy
+
+
+def test_links_at_half_a_turn_are_both_searched():
+    rod = build_rod(straight_chain(150, 2 * np.pi * 14.5 / 150))
+    search = lowest_continuum_ring(rod)
+    assert {14, 15} <= set(search.links)
+    a, b = (ring for ring in search.equilibria if ring.link in (14, 15))
+    assert a.energy == pytest.approx(b.energy, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "tolerance"), [(0.2, 0.06), (0.7, 0.01), (1.5, 0.01), (5.0, 0.04), (20.0, 0.06)]
+)
+def test_random_sequences_find_the_discrete_minimum(ratio, tolerance):
+    """The discrete search, independent of the continuum, finds the same minimum.
+
+    The tolerances are the models' own gap: it grows away from K3 = K1.
+    """
+    rng = np.random.default_rng(7)
+    for seed in range(6):
+        length = int(rng.integers(60, 400))
+        chain = random_chain(seed, length, ANGLE_SETS[seed % 3], ratio)
+        ring = lowest_continuum_ring(build_rod(chain)).lowest
+        discrete = find_rings(chain).lowest
+        assert ring.stable
+        assert ring.residual < 1e-10
+        assert ring.energy == pytest.approx(discrete.energy, rel=tolerance)
+
+
+@pytest.mark.parametrize("links", ["some", "AUTO"])
+def test_bad_links_are_refused(links):
+    with pytest.raises(InputError, match="'auto', 'all' or an integer"):
+        lowest_continuum_ring(molecule_rod("11T15"), links=links)
+
+
+def test_nothing_found_raises_with_the_partial_search():
+    options = ContinuumOptions(max_iterations=1, homotopy_steps=0)
+    search = lowest_continuum_ring(molecule_rod("12A09"), options=options)
+    with pytest.raises(SolveError, match="no equilibrium was found") as caught:
+        _ = search.lowest
+    assert caught.value.partial is search
+
+
+@pytest.mark.slow
+def test_wide_sample_of_random_sequences():
+    """60 to 400 bp, K3/K1 0.2 to 20: every search ends in a stable ring."""
+    rng = np.random.default_rng(11)
+    unstable = 0
+    for seed in range(200):
+        chain = random_chain(
+            seed,
+            int(rng.integers(60, 400)),
+            ANGLE_SETS[seed % 3],
+            float(10 ** rng.uniform(-0.7, 1.3)),
+        )
+        ring = lowest_continuum_ring(build_rod(chain)).lowest
+        assert ring.residual < 1e-10
+        unstable += ring.stable is False
+    assert unstable <= 4
