@@ -87,18 +87,16 @@ def rod_stiffness(stiffness: Array, phase: Array, options: RodOptions) -> RodSti
     reach = width - 1
     cyclic = scalar[np.arange(-reach, n + reach) % n]
     local = np.stack([np.convolve(cyclic[:, c], weights, "valid") for c in range(2)], axis=1)
-    anisotropy = coupling = 0.0
-    if width < n:
-        norm = np.convolve(np.ones(n), weights, "same")
+    norm = np.convolve(np.ones(n), weights)[reach : reach + n]
 
-        def windowed(values: Array) -> Array:
-            return np.convolve(values, weights, "same") / norm
+    def windowed(values: Array) -> Array:
+        return np.convolve(values, weights)[reach : reach + n] / norm
 
-        half_difference = windowed(0.5 * (natural[:, 0, 0] - natural[:, 1, 1]))
-        off_diagonal = windowed(natural[:, 0, 1])
-        anisotropy = float(np.max(np.hypot(half_difference, off_diagonal) / local[:, 0]))
-        coupled = np.hypot(windowed(natural[:, 0, 2]), windowed(natural[:, 1, 2]))
-        coupling = float(np.max(coupled / np.sqrt(local[:, 0] * local[:, 1])))
+    half_difference = windowed(0.5 * (natural[:, 0, 0] - natural[:, 1, 1]))
+    off_diagonal = windowed(natural[:, 0, 1])
+    anisotropy = float(np.max(np.hypot(half_difference, off_diagonal) / local[:, 0]))
+    coupled = np.hypot(windowed(natural[:, 0, 2]), windowed(natural[:, 1, 2]))
+    coupling = float(np.max(coupled / np.sqrt(local[:, 0] * local[:, 1])))
     limit = options.anisotropy_limit
     if max(anisotropy, coupling) > limit:
         what = "bending anisotropy" if anisotropy >= coupling else "bend-twist coupling"
