@@ -181,9 +181,16 @@ def check_ratios(ratios: ArrayLike) -> Array:
 
 
 def sweep_continuum(
-    rod: Rod, ratios: ArrayLike, options: SweepOptions | None = None
+    rod: Rod,
+    ratios: ArrayLike,
+    options: SweepOptions | None = None,
+    corrected_for: Chain | None = None,
 ) -> RatioSweep:
     """Lowest continuum rings of a rod over twist ratios, at fixed bending stiffness.
+
+    ``corrected_for``, the chain that the rod was made from, replaces the energy by that with the
+    steps' own compliance (:mod:`dnacheck.ring.homogenised`); bending and twisting parts remain
+    those of the isotropic rod.
 
     Raises
     ------
@@ -191,7 +198,9 @@ def sweep_continuum(
         A ratio that is not positive, or ratios that do not increase.
     """
     options = options or SweepOptions()
-    return _sweep(ContinuumModel(rod, options.tolerance), check_ratios(ratios), options)
+    return _sweep(
+        ContinuumModel(rod, options.tolerance, corrected_for), check_ratios(ratios), options
+    )
 
 
 def sweep_discrete(
@@ -243,8 +252,7 @@ def _sweep(model: _Model, ratios: Array, options: SweepOptions) -> RatioSweep:
         ratios=ratios,
         lowest=lowest,
         tracks=tuple(
-            Track(**_table(track), found_at=at)
-            for track, at in zip(tracks, found_at, strict=True)
+            Track(**_table(track), found_at=at) for track, at in zip(tracks, found_at, strict=True)
         ),
         crossings=crossings,
         energy_scale_RT=model.energy_scale_RT,

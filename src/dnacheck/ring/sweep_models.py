@@ -17,6 +17,7 @@ from dnacheck.ring.continuum.options import ContinuumOptions
 from dnacheck.ring.continuum.search import lowest_continuum_ring
 from dnacheck.ring.continuum.state import State, new_state, run_newton
 from dnacheck.ring.discrete import NewtonOptions, solve_ring
+from dnacheck.ring.homogenised import StepAxes, local_moment, moment_energy, step_axes
 from dnacheck.ring.search import SearchOptions, find_rings
 from dnacheck.ring.topology_kernels import polygon_writhe
 
@@ -61,8 +62,10 @@ class ContinuumModel:
 
     kind: Literal["continuum", "discrete"] = "continuum"
 
-    def __init__(self, rod: Rod, tolerance: float) -> None:
+    def __init__(self, rod: Rod, tolerance: float, chain: Chain | None = None) -> None:
         self.name = rod.name
+        self.chain = chain
+        self.axes: StepAxes | None = None if chain is None else step_axes(chain, rod)
         self.energy_scale_RT = rod.energy_scale_RT
         self.rod = rod
         intervals = _PER_PIECE * (rod.breaks.size - 1)
@@ -83,9 +86,15 @@ class ContinuumModel:
             if not ring.stable:
                 continue
             unknowns = np.concatenate([ring.slopes.ravel(), ring.loads])
+            energy = ring.energy
+            if self.axes is not None:
+                solution = ring.solution(self.axes.s)
+                energy = self._corrected(
+                    energy, ratio, solution[:, 3:7], solution[:, :3], ring.loads
+                )
             found.append(
                 Minimum(
-                    ring.energy,
+                    energy,
                     ring.bend,
                     ring.twist,
                     ring.link,
@@ -112,10 +121,22 @@ class ContinuumModel:
             return None
         bend, twist, total = (float(x) for x in state.parts.sum(axis=0))
         corners = np.arange(_WRITHE_CORNERS) / _WRITHE_CORNERS
-        centres = state.evaluate(corners, state.quaternions())[1]
+        quaternions = state.quaternions()
+        centres = state.evaluate(corners, quaternions)[1]
         turns = (total - self.rod.end_rotation) / (2.0 * np.pi)
         link = int(np.rint(turns + polygon_writhe(centres)))
-        return Minimum(bend + twist, bend, twist, link, state.residual, unknowns, like.alpha)
+        energy = bend + twist
+        if self.axes is not None:
+            q, r, _ = state.evaluate(self.axes.s, quaternions)
+            energy = self._corrected(energy, ratio, q, r, state.loads)
+        return Minimum(energy, bend, twist, link, state.residual, unknowns, like.alpha)
+
+    def _corrected(self, energy: float, ratio: float, q: Array, r: Array, loads: Array) -> float:
+        """See :mod:`dnacheck.ring.homogenised`."""
+        assert self.axes is not None
+        assert self.chain is not None
+        compliance = self.axes.compliance(self.chain.with_twist_ratio(ratio).stiffness)
+        return 2.0 * energy - moment_energy(local_moment(q, r, loads), compliance)
 
 
 class DiscreteModel:
