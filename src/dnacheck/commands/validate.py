@@ -59,6 +59,8 @@ def command(
     """
     if quick and full:
         raise click.UsageError("--quick and --full exclude each other")
+    if new_scene is not None:
+        return _write_scene(new_scene, run)
     from dnacheck.validate.harness import RunOptions, run_scene
     from dnacheck.validate.plan import make_plan
     from dnacheck.validate.registry import Level, select
@@ -79,6 +81,21 @@ def command(
         record = run_scene(loaded, options, told)
     _print_outcome(record, output, run)
     return EXIT_CHECK_FAILED if record.verdict.value == "fail" else None
+
+
+def _write_scene(path: Path, run: RunSettings) -> None:
+    """Write the commented template; an existing file is not overwritten."""
+    from dnacheck.model.files import atomic_write
+    from dnacheck.numerics.outcome import InputError
+    from dnacheck.validate.scene import scenes_directory
+
+    if path.exists():
+        raise InputError(f"file '{path}' exists; name another file for the new scene")
+    atomic_write(path, (scenes_directory() / "template.toml").read_text(encoding="utf-8"))
+    if run.json:
+        print_json({"scene": str(path)})
+    else:
+        note(f"scene: {path}; run it with  dnacheck validate {path}", run.quiet)
 
 
 def _print_list(plan: Plan, as_json: bool) -> None:

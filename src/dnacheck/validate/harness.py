@@ -5,9 +5,10 @@ from __future__ import annotations
 import datetime
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from dnacheck.validate.baseline import compare, read_baseline
 from dnacheck.validate.plan import Plan, make_plan
 from dnacheck.validate.provenance import provenance
 from dnacheck.validate.registry import Check, Findings, Level
@@ -47,6 +48,7 @@ def run_scene(
         The output folder can't be written, or the baseline is not a report.
     """
     began = time.perf_counter()
+    old = read_baseline(options.baseline) if options.baseline is not None else None
     plan = make_plan(scene, options.level, options.only)
     planned(plan)
     key = run_key(scene, options.level, options.seed)
@@ -71,6 +73,8 @@ def run_scene(
         finished=datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC"),
         resumed=resumed,
     )
+    if old is not None:
+        record = replace(record, baseline=compare(old, record.results))
     write_report(record, options.folder)
     state.remove()
     return record

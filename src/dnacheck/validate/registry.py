@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dnacheck.validate.context import Context
     from dnacheck.validate.scene import Scene
 
-GROUP_MODULES = ("table2",)
+GROUP_MODULES = ("table2", "wanted", "continuum", "sweeps")
 """Modules of ``dnacheck.validate.checks``, in the order of the report. Each defines ``GROUP``."""
 
 

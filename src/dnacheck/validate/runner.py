@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
+import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -50,6 +51,22 @@ class _Worker:
             self.process.join()
 
 
+@contextlib.contextmanager
+def _one_library_thread() -> Iterator[None]:
+    """Processes started here let linear algebra use one thread each: the cores are taken."""
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+    before = {name: os.environ.get(name) for name in names}
+    os.environ.update(dict.fromkeys(names, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
 def run_checks(
     job: Job,
     checks: Sequence[Check],
@@ -72,14 +89,16 @@ def run_checks(
             done[check.name] = findings
             progress(check, findings, True)
     waiting.sort(key=lambda check: -check.seconds)
-    workers = [_Worker(job) for _ in range(min(processes, len(waiting)))]
+    with _one_library_thread():
+        workers = [_Worker(job) for _ in range(min(processes, len(waiting)))]
     try:
         while waiting or any(worker.check for worker in workers):
             for index, worker in enumerate(workers):
                 if worker.check is None and waiting:
                     if not worker.process.is_alive():
                         worker.end()
-                        workers[index] = worker = _Worker(job)
+                        with _one_library_thread():
+                            workers[index] = worker = _Worker(job)
                     worker.give(waiting.pop(0))
             for worker in _events(workers):
                 finished = worker.check

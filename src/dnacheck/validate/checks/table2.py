@@ -304,8 +304,8 @@ def shape(context: Context) -> Findings:
         "as lines, after optimal superposition; seen along the smallest and the largest principal "
         "axis.",
         "Figure 11",
-        width=7.2,
-        height=3.9,
+        width=4.6,
+        height=4.4,
         summary=True,
     )
     shown = [{"name": case.name, "curves": _curves(case)} for case in found]

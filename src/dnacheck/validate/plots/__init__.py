@@ -8,15 +8,31 @@ one function per panel.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from dnacheck.validate.plots import shapes
+from dnacheck.validate.plots import continuation, rod, shapes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Panel = Callable[["Axes", Mapping[str, Any]], "Axes"]
 
+
+def _sweep(quantity: str) -> Panel:
+    def panel(ax: Axes, data: Mapping[str, Any]) -> Axes:
+        return continuation.sweep(ax, data["lines"], quantity)
+
+    return panel
+
+
 KINDS: dict[str, tuple[Panel, ...]] = {
     "superimposed_rings": (shapes.rings_from_above, shapes.rings_from_the_side),
+    "centreline_scales": (rod.centreline_from_the_side, rod.centreline_end_on),
+    "filters": (rod.filtered_once, rod.filtered_twice),
+    "diagram": (continuation.diagram, continuation.diagram_by_twist),
+    "ribbons": (continuation.ring_ribbon, continuation.ring_natural_ribbon),
+    "robustness": (continuation.robustness, partial(continuation.robustness, which="by_width")),
+    "sweep_energy": (_sweep("energy"),),
+    "sweep_parts": (_sweep("bend"), _sweep("twist")),
 }

@@ -72,7 +72,11 @@ def sweep(ax: Axes, data: Sequence[Mapping[str, Any]], quantity: str = "energy")
         for crossing in line.get("crossings", ()) if quantity == "energy" else ():
             ax.plot(crossing["ratio"], crossing["energy"], "x", color=INK, ms=5, zorder=4)
     _end_labels(ax, ends)
-    words = {"energy": "energy / RT", "bend": "bending energy / RT", "twist": "twisting energy / RT"}
+    words = {
+        "energy": "energy / RT",
+        "bend": "bending energy / RT",
+        "twist": "twisting energy / RT",
+    }
     return _plain(ax, "K₃ / K₁", words[quantity], "")
 
 

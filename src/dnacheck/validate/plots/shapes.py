@@ -27,21 +27,23 @@ def _projection(
     ax: Axes, data: Mapping[str, Any], across: int, up: int, depth: int, title: str
 ) -> Axes:
     """Strands as beads (discrete) and lines (continuum), nearer parts darker and on top."""
+    from matplotlib.collections import LineCollection
+    from matplotlib.colors import to_rgb
+
     for strand, colour in (("strand1", BLUE), ("strand2", RUST)):
         line = np.asarray(data["continuum"][strand])
         beads = np.asarray(data["discrete"][strand])
-        nearness = _nearness(line[:, depth])
-        for start in range(len(line) - 1):
-            near = nearness[start]
-            ax.plot(
-                line[start : start + 2, across],
-                line[start : start + 2, up],
-                color=colour,
-                linewidth=1.1 + 1.1 * near,
-                alpha=0.25 + 0.35 * near,
-                solid_capstyle="round",
-                zorder=2 + near,
-            )
+        order = np.argsort(line[:-1, depth])
+        near = _nearness(line[:-1, depth])[order]
+        flat = line[:, [across, up]]
+        segments = LineCollection(
+            np.stack([flat[:-1], flat[1:]], axis=1)[order].tolist(),
+            colors=[(*to_rgb(colour), 0.25 + 0.35 * value) for value in near],
+            linewidths=1.1 + 1.1 * near,
+            capstyle="round",
+            zorder=2,
+        )
+        ax.add_collection(segments)
         near = _nearness(beads[:, depth])
         ax.scatter(
             beads[:, across],
@@ -54,7 +56,9 @@ def _projection(
         )
     axis = np.asarray(data["discrete"]["axis"])
     ax.plot(axis[:, across], axis[:, up], color=QUIET, linewidth=0.7, zorder=1)
+    reach = 1.04 * float(np.abs(np.asarray(data["discrete"]["strand1"])[:, 0]).max()) + 8.0
     ax.set_aspect("equal")
+    ax.set_xlim(-reach, reach)
     ax.set_title(title, fontsize=9, color=INK, loc="left")
     _scale_bar(ax, data)
     ax.axis("off")

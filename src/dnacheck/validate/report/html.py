@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,6 +32,7 @@ def report_html(record: RunRecord) -> tuple[str, dict[str, str]]:
     )
     environment.filters["cell"] = cell_text
     environment.filters["duration"] = duration
+    environment.filters["science"] = science
     svgs: dict[str, str] = {}
     sections = record.sections()
     views: list[dict[str, Any]] = [
@@ -79,6 +81,16 @@ def count(results: Sequence[CheckResult]) -> dict[str, int]:
     }
 
 
+def science(text: str) -> Any:
+    """Escaped text with indices such as K_θ set as subscripts."""
+    import markupsafe
+
+    escaped = str(markupsafe.escape(text))
+    return markupsafe.Markup(
+        re.sub(r"\b(K|E|m|w|d|n)_(disc|cont|[θφτ0-9])(?![A-Za-z0-9])", r"\1<sub>\2</sub>", escaped)
+    )
+
+
 def duration(seconds: float | None) -> str:
     """A time span in words of fitting size."""
     if seconds is None:
@@ -97,8 +109,10 @@ def _view(block: Block, svgs: dict[str, str]) -> dict[str, Any]:
         view |= {"kind": "table", "csv": data_uri("text/csv", table_csv(block))}
         view |= {"groups": _column_groups(block.columns), "numeric": _numeric(block)}
     elif isinstance(block, Figure):
-        svgs[block.id] = draw_svg(block)
-        view |= {"kind": "figure", "image": data_uri("image/svg+xml", svgs[block.id])}
+        drawings = draw_svg(block)
+        for number, svg in enumerate(drawings, start=1):
+            svgs[f"{block.id}-{number}" if len(drawings) > 1 else block.id] = svg
+        view |= {"kind": "figure", "images": [data_uri("image/svg+xml", svg) for svg in drawings]}
     elif isinstance(block, Rings):
         view |= {"kind": "rings", "data": list(block.rings)}
     elif isinstance(block, Note):

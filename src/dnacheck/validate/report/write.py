@@ -173,6 +173,10 @@ def write_report(record: RunRecord, folder: Path) -> Path:
         raise InputError(
             f"output folder '{folder}': {error.strerror}; name a writable folder with -o"
         ) from None
+    kept = {f"{table.id}.csv" for table in record.tables()} | {f"{name}.svg" for name in figures}
+    for old in [*(folder / "tables").glob("*.csv"), *(folder / "figures").glob("*.svg")]:
+        if old.name not in kept:
+            old.unlink()
     for table in record.tables():
         atomic_write(folder / "tables" / f"{table.id}.csv", table_csv(table))
     for name, svg in figures.items():

@@ -69,9 +69,9 @@
     Plotly.react(stage, traces(ring), {
       margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: stage.clientWidth > 600,
       legend: { x: 1, xanchor: "right", y: 1, bgcolor: "rgba(255,255,255,0.7)" },
-      scene: { aspectmode: "data", xaxis: axis, yaxis: axis, zaxis: axis, camera: { eye: { x: 0.3, y: -0.9, z: 1.2 } } },
-      uirevision: "keep"
-    }, { responsive: true, displaylogo: false, displayModeBar: false });
+      scene: { aspectmode: "data", xaxis: axis, yaxis: axis, zaxis: axis, camera: { eye: { x: 0.15, y: -1.05, z: 1.85 }, up: { x: 0, y: 1, z: 0 } } },
+      uirevision: "keep", width: stage.clientWidth, height: stage.clientHeight
+    }, { displaylogo: false, displayModeBar: false });
   }
   document.querySelectorAll("select.rings-choice").forEach(function (select) {
     const id = select.dataset.for;
@@ -89,6 +89,9 @@
       show(stage, rings[Number(select.value)]);
     }
     select.addEventListener("change", update);
+    window.addEventListener("resize", function () {
+      if (started) Plotly.relayout(stage, { width: stage.clientWidth, height: stage.clientHeight });
+    });
     if ("IntersectionObserver" in window) {
       const observer = new IntersectionObserver(function (entries) {
         if (entries.some(function (entry) { return entry.isIntersecting; })) {
