@@ -84,9 +84,7 @@ def command(
     from dnacheck.ring.continuation.figures import component_data
 
     try:
-        found = _components(
-            target, bounds, start, search, max_points, n_bp, model, continuum
-        )
+        found = _components(target, bounds, start, search, max_points, n_bp, model, continuum)
     except BranchError as error:
         return _failed(target, error, run)
     data = [component_data(component) for component in found]
@@ -120,7 +118,7 @@ def _components(
     from dataclasses import replace
 
     from dnacheck.model.chain import build_chain
-    from dnacheck.model.molecules import read_targets
+    from dnacheck.model.molecules import read_target
     from dnacheck.model.rod import RodOptions, build_rod
     from dnacheck.numerics.outcome import InputError
     from dnacheck.ring.continuation import diagram
@@ -137,7 +135,7 @@ def _components(
         if search:
             raise InputError("the perfect diagram is connected: leave out --components")
         return (diagram.perfect_diagram(rod, 0.5 if alpha is None else alpha, limits, options),)
-    molecules = list(read_targets(target))
+    molecules = list(read_target(target))
     if len(molecules) != 1:
         raise InputError(f"a diagram is of one molecule, '{target}' holds {len(molecules)}")
     molecule = molecules[0]
@@ -195,7 +193,8 @@ def _draw(
     rings = [] if target == "perfect" else [ring_shape(r) for r in marked_rings(found[0])[:2]]
 
     def draw(figure: Any) -> None:
-        grid = figure.add_gridspec(1 + len(rings[:1]), 2, height_ratios=[1.3, 1.0][: 1 + len(rings[:1])])
+        rows = 2 if rings else 1
+        grid = figure.add_gridspec(rows, 2, height_ratios=[1.3, 1.0][:rows])
         plots.diagram(figure.add_subplot(grid[0, 0]), {"branches": branches, "title": target})
         plots.diagram_by_twist(figure.add_subplot(grid[0, 1]), {"branches": branches})
         for i, ring in enumerate(rings):

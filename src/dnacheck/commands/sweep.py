@@ -95,13 +95,13 @@ def command(
     energies are those of the lowest ring at each; the twist ratio of the model is not used.
     """
     from dnacheck.model.chain import build_chain
-    from dnacheck.model.molecules import read_targets
+    from dnacheck.model.molecules import read_target
     from dnacheck.model.rod import RodOptions, build_rod
     from dnacheck.numerics.outcome import InputError
     from dnacheck.ring.continuation.figures import sweep_data
     from dnacheck.ring.sweep import sweep_continuum, sweep_discrete
 
-    molecules = list(read_targets(target))
+    molecules = list(read_target(target))
     models = ("continuum", "discrete") if which == "both" else (which,)
     rod_options = RodOptions(
         filter_width=continuum.filter_width,

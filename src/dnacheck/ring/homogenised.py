@@ -99,7 +99,8 @@ def step_axes(chain: Chain, rod: Rod) -> StepAxes:
     linearise(chain.ground, chain.form_code, centres, frames, own, halves)
     # rows are axes, in the frame of base pair 0, which the padded chain has at ``start``
     axes = np.einsum("ab,ikb->iak", start, own)
-    s, d1, d3 = evaluate_at_parameter(natural, np.arange(n) + 1.0)
+    hinges: Array = np.arange(n, dtype=float) + 1.0
+    s, d1, d3 = evaluate_at_parameter(natural, hinges)
     triad = np.stack([d1, np.cross(d3, d1), d3], axis=-1)
     local = np.einsum("iab,iac->ibc", triad, axes)
     for array in (s, local):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dnacheck.ring.continuation.branch import Branch, End, Kind, SpecialPoint
+from dnacheck.ring.continuation.branch import Branch, Kind, SpecialPoint
 from dnacheck.ring.continuation.follow import Bounds, follow_branch
 from dnacheck.ring.continuation.walker import Spot, Walker
 
@@ -31,8 +31,8 @@ class Component:
     branches : tuple of Branch
     failures : tuple of SpecialPoint
         Branch points at which no second branch was found.
-    ends : tuple of End
-        Why the search for more branches stopped short, if it did.
+    unexplored : tuple of SpecialPoint
+        Branch points left aside because ``max_branches`` was reached.
     """
 
     branches: tuple[Branch, ...]
@@ -171,6 +171,3 @@ def _on(branch: Branch, spot: Spot, walker: Walker) -> bool:
     along = np.clip(-np.sum(gaps[:-1] * steps, axis=1) / squares, 0.0, 1.0)
     nearest = np.linalg.norm(gaps[:-1] + along[:, None] * steps, axis=1)
     return bool(np.any(nearest < 0.05 * np.sqrt(squares) + 1e-6))
-
-
-__all__ = ["Component", "End", "follow_component", "switch"]

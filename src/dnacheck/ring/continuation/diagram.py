@@ -9,21 +9,27 @@ from numpy.typing import NDArray
 
 from dnacheck.model.rod.rod import Rod
 from dnacheck.numerics.outcome import InputError
-from dnacheck.ring.continuation.branch import BranchError, End
+from dnacheck.ring.continuation.branch import Branch, BranchError, End
 from dnacheck.ring.continuation.component import Component, follow_component
-from dnacheck.ring.continuation.follow import Bounds, degenerate
+from dnacheck.ring.continuation.follow import Bounds, degenerate, follow_branch
 from dnacheck.ring.continuation.options import ContinuationOptions
-from dnacheck.ring.continuation.parameters import Parameter, end_twist
+from dnacheck.ring.continuation.parameters import (
+    Parameter,
+    curvature_fraction,
+    end_twist,
+    twist_ratio,
+)
 from dnacheck.ring.continuation.walker import Spot, Walker
 from dnacheck.ring.continuum.collocation import Discretisation, aligned_mesh, discretise
+from dnacheck.ring.continuum.homotopy import detours
 from dnacheck.ring.continuum.options import ContinuumOptions
 from dnacheck.ring.continuum.ring import ContinuumRing
 from dnacheck.ring.continuum.search import lowest_continuum_ring
-from dnacheck.ring.continuum.solver import SOLVED
 from dnacheck.ring.continuum.state import (
     State,
     new_state,
     register_roll,
+    run_newton,
     start_from_perfect_ring,
     transfer,
 )
@@ -173,6 +179,60 @@ def imperfect_component(
     return follow_component(walker, spot, bounds, marks=(rod.end_rotation,), depth=depth)
 
 
+def curvature_branch(
+    rod: Rod,
+    alpha: float,
+    start: float = 0.02,
+    turn: float = 0.0,
+    bounds: Bounds | None = None,
+    options: ContinuationOptions | None = None,
+) -> Branch:
+    """Homotopy of Section VII: the fraction gamma of the curvature, at fixed end twist.
+
+    gamma = 0 is no start: the perfect ring may be rolled, so that every register solves it, and
+    only those that first-order perturbation selects continue to gamma > 0.
+
+    Parameters
+    ----------
+    alpha : float
+        End twist, radians.
+    start : float
+        gamma to start from, on the perfect ring in the register that perturbation selects.
+    turn : float
+        Roll away from that register.
+
+    Raises
+    ------
+    BranchError
+        No start, a degenerate one (gamma = 0), or one outside the bounds.
+    """
+    options = ContinuationOptions() if options is None else options
+    bounds = Bounds(-1.0, 1.0) if bounds is None else bounds
+    _check_bounds(bounds, start, "curvature_fraction")
+    disc = mesh_for(rod, options)
+    state = new_state(disc)
+    start_from_perfect_ring(state, alpha, register_roll(disc, alpha) + turn)
+    walker, spot = start_walker(disc, curvature_fraction(alpha), options, start, state)
+    return follow_branch(walker, spot, bounds)
+
+
+def ratio_branch(
+    rod: Rod,
+    ring: ContinuumRing,
+    bounds: Bounds | None = None,
+    options: ContinuationOptions | None = None,
+) -> Branch:
+    """A ring followed in K3/K1 at fixed end twist (end of Section VII); default 0.5 to 1.5."""
+    options = ContinuationOptions() if options is None else options
+    bounds = Bounds(0.5, 1.5) if bounds is None else bounds
+    start = rod.twist_stiffness / rod.bend_stiffness
+    _check_bounds(bounds, start, "twist_ratio")
+    disc = mesh_for(rod, options)
+    state = _state_of(ring, disc)
+    walker, spot = start_walker(disc, twist_ratio(ring.alpha), options, start, state)
+    return follow_branch(walker, spot, bounds)
+
+
 def lowest_component(
     rod: Rod, bounds: Bounds | None = None, options: ContinuationOptions | None = None
 ) -> Component:
@@ -195,7 +255,7 @@ def components(
         alpha in radians; default eight values over four turns about zero.
     """
     if starts is None:
-        starts = 2.0 * np.pi * (np.arange(8) / 2.0 - 1.9)
+        starts = [2.0 * np.pi * (0.5 * i - 1.9) for i in range(8)]
     found: list[Component] = []
     for alpha in starts:
         for turn in (0.0, np.pi):
@@ -210,8 +270,6 @@ def components(
 
 def _shares(new: Component, old: Component) -> bool:
     """Whether the start of a new component lies on an old one."""
-    from dnacheck.ring.continuation.follow import SAME  # noqa: F401
-
     first = new.branches[0]
     bend = first.disc.rod.bend_stiffness
     scale = 2.0 * np.pi * bend * np.array([1.0] * 3 + [2.0 * np.pi] * 3)
@@ -248,9 +306,6 @@ def _find_start(
     disc: Discretisation, alpha: float, turn: float, options: ContinuationOptions
 ) -> State:
     """A ring at end twist alpha from the rolled perfect ring."""
-    from dnacheck.ring.continuum.homotopy import detours
-    from dnacheck.ring.continuum.state import run_newton
-
     newton = ContinuumOptions(tolerance=options.tolerance)
     state = new_state(disc)
     start_from_perfect_ring(state, alpha, register_roll(disc, alpha) + turn)
@@ -259,9 +314,4 @@ def _find_start(
     for converged in detours(state, alpha, turn, newton):
         if converged:
             return state
-    raise BranchError(
-        End.NO_START, f"start at end_twist = {alpha:.6g}: {End.NO_START.value}"
-    )
-
-
-_ = SOLVED
+    raise BranchError(End.NO_START, f"start at end_twist = {alpha:.6g}: {End.NO_START.value}")

@@ -205,9 +205,7 @@ def sweep_data(sweep: RatioSweep) -> dict[str, Any]:
         "twist": sweep.twist * scale,
         "link": sweep.link,
         "residual": sweep.residual,
-        "tracks": [
-            {"energy": track.energy * scale, "link": track.link} for track in sweep.tracks
-        ],
+        "tracks": [{"energy": track.energy * scale, "link": track.link} for track in sweep.tracks],
         "crossings": [
             {
                 "ratio": crossing.ratio,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from dnacheck.numerics.outcome import InputError
 from dnacheck.ring.continuation.branch import Branch, End, Kind, SpecialPoint
 from dnacheck.ring.continuation.locate import specials_between, to_special
-from dnacheck.ring.continuation.options import ContinuationOptions
 from dnacheck.ring.continuation.parameters import Parameter
 from dnacheck.ring.continuation.walker import Spot, Walker
 
@@ -22,6 +21,7 @@ Array = NDArray[np.float64]
 _DEGENERATE = 1e-6
 #: Two scaled points closer than this are the same solution.
 SAME = 1e-6
+_ON_MARK = 1e-12
 _GROW, _SHRINK, _SHRINK_BEND = 1.4, 0.4, 0.6
 
 
@@ -237,11 +237,15 @@ def follow_branch(
     """
     began = time.perf_counter()
     ahead, special, end = march(walker, start, bounds, marks, None)
+    special = _mark_of_start(walker, start, marks) + [
+        point
+        for point in special
+        if point.kind is not Kind.MARK
+        or float(np.linalg.norm(_scaled(walker, point) - start.scaled)) > SAME
+    ]
     spots = [start, *ahead]
     ends: tuple[End, ...] = (end,)
     if both and end is not End.CLOSED:
-        from dataclasses import replace
-
         back = replace(
             start, tangent=-start.tangent, slopes_rate=-start.slopes_rate, sign=-start.sign
         )
@@ -254,6 +258,8 @@ def follow_branch(
                 tangent=-point.tangent,
             )
             for point in reversed(found)
+            if point.kind is not Kind.MARK
+            or float(np.linalg.norm(_scaled(walker, point) - start.scaled)) > SAME
         ]
         special = flipped + [replace(point, index=point.index + n) for point in special]
         reversed_spots = [
@@ -262,6 +268,22 @@ def follow_branch(
         spots = [*reversed_spots, *spots]
         ends = (first, end)
     return make_branch(walker, spots, special, ends, time.perf_counter() - began)
+
+
+def _scaled(walker: Walker, point: SpecialPoint) -> Array:
+    return np.asarray(np.append(point.loads, point.parameter) / walker.scale, dtype=float)
+
+
+def _mark_of_start(walker: Walker, start: Spot, marks: Sequence[float]) -> list[SpecialPoint]:
+    """The start as a marked solution, if it is one."""
+    period = walker.active.period
+    for mark in marks:
+        gap = start.parameter - mark
+        if period is not None:
+            gap -= period * round(gap / period)
+        if abs(gap) <= _ON_MARK * walker.scale[6]:
+            return [to_special(start, Kind.MARK, 0, start.parameter)]
+    return []
 
 
 def make_branch(

@@ -185,9 +185,7 @@ def bordered_step(
     n_intervals = slopes.shape[0]
     f = free.size
     rows = np.empty((f, 8))
-    left_out = closing_rows(
-        frames, centres, sensitivity, alpha, alpha_rate, f < 6, rows
-    )
+    left_out = closing_rows(frames, centres, sensitivity, alpha, alpha_rate, f < 6, rows)
     matrix = np.zeros((f + 1, f + 1))
     rhs = np.zeros((f + 1, 2))
     level_now = border[6] * parameter / scale[6]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +67,7 @@ def specials_between(
         branching, other = _bracket(walker, here, there, determinant)
         point = to_special(branching, Kind.BRANCH_POINT, index, other.parameter)
         found.append((_along(here, branching), point))
-    for first, second in zip(corners[:-1], corners[1:], strict=True):
+    for first, second in pairwise(corners):
         for value in _crossed(walker, first.parameter, second.parameter, marks):
             spot = _solve_at(walker, first, second, value)
             if spot is not None:
@@ -87,7 +88,8 @@ def _between(walker: Walker, a: Spot, b: Spot, fraction: float) -> Spot | None:
     # cubic Hermite in the scaled unknowns and the slopes
     h00, h10 = (1 + 2 * x) * (1 - x) ** 2, x * (1 - x) ** 2
     h01, h11 = x * x * (3 - 2 * x), x * x * (x - 1)
-    ta, tb = length / max(a.tangent @ border, 0.3), length / max(b.tangent @ border, 0.3)
+    ta = length / max(float(a.tangent @ border), 0.3)
+    tb = length / max(float(b.tangent @ border), 0.3)
     scaled = h00 * a.scaled + h01 * b.scaled + h10 * ta * a.tangent + h11 * tb * b.tangent
     slopes = h00 * a.slopes + h01 * b.slopes + h10 * ta * a.slopes_rate + h11 * tb * b.slopes_rate
     unknowns = scaled * walker.scale

@@ -39,7 +39,7 @@ def diagram(ax: Axes, data: Mapping[str, Any], across: str = "end_moment") -> Ax
         for point in branch["special"]:
             where = point["end_moment"] if across == "end_moment" else point["value"] / (2 * np.pi)
             if point["kind"] == "mark":
-                ax.plot(where, point["energy"], "o", mfc="white", mec=RUST, ms=6.5, zorder=4)
+                ax.plot(where, point["energy"], "o", mfc="white", mec=RUST, ms=5.5, zorder=4)
             elif point["kind"] == "branch point":
                 ax.plot(where, point["energy"], "s", color=INK, ms=3.0, zorder=3)
     label = "end moment m₃(0) / RT" if across == "end_moment" else "end twist α / 2π"
@@ -66,7 +66,10 @@ def sweep(ax: Axes, data: Sequence[Mapping[str, Any]], quantity: str = "energy")
         if line["model"] == "discrete":
             ax.plot(ratios, values, ".", color=colour, markersize=4, zorder=3)
         else:
-            ax.plot(ratios, values, color=colour, linewidth=1.2, zorder=2)
+            # no line joins two minima: each stretch of one link is its own
+            links = np.asarray(line.get("link", np.zeros(len(ratios))))
+            for part in np.split(np.arange(len(ratios)), np.flatnonzero(np.diff(links)) + 1):
+                ax.plot(ratios[part], values[part], color=colour, linewidth=1.2, zorder=2)
         if name not in [end[1] for end in ends] and np.isfinite(values).any():
             ends.append((float(values[np.isfinite(values)][-1]), name, colour))
         for crossing in line.get("crossings", ()) if quantity == "energy" else ():
