@@ -20,6 +20,7 @@ import io
 import re
 import shlex
 import sys
+import traceback
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -106,7 +107,8 @@ def _run_session(fence: Fence, names: dict[str, object], page: str) -> list[Diff
             self.differ(test, example, got)
 
         def report_unexpected_exception(self, out, test, example, exc_info):  # type: ignore[no-untyped-def]
-            self.differ(test, example, f"{exc_info[0].__name__}: {exc_info[1]}")
+            last = "".join(traceback.format_exception_only(*exc_info[:2]))
+            self.differ(test, example, f"Traceback (most recent call last):\n  ...\n{last}")
 
         def differ(self, test, example, got):  # type: ignore[no-untyped-def]
             line = fence.line + example.lineno + example.source.count("\n")
