@@ -120,4 +120,7 @@ def discretise(rod: Rod, mesh: Array, degree: int) -> Discretisation:
     points = (mesh[:-1, None] + h[:, None] * rule.points).ravel()
     compliance = rod.relative_compliance(points)
     compliance = compliance / np.array([rod.bend_stiffness, rod.twist_stiffness])
+    mesh = mesh.copy()
+    for array in (mesh, h, points):
+        array.setflags(write=False)
     return Discretisation(rod, mesh, h, rule, points, rod.strains(points), compliance)

@@ -16,6 +16,28 @@ from dnacheck.ring.continuum.kernels.interpolate import evaluate
 Array = NDArray[np.float64]
 
 
+def evaluate_ring(
+    s: Array, mesh: Array, slopes: Array, quaternions: Array, centres: Array
+) -> tuple[Array, Array, Array]:
+    """Collocation polynomials at the points s; arrays as in ``kernels.interpolate.evaluate``.
+
+    Returns
+    -------
+    q, r, u : ndarray, shapes (m, 4), (m, 3), (m, 3)
+        Natural frame, position, and strain rate in laboratory axes.
+    """
+    rule = gauss_rule(slopes.shape[1])
+    out = np.empty((s.size, 4)), np.empty((s.size, 3)), np.empty((s.size, 3))
+    # Read-only views, whatever comes in: the kernel is compiled for one kind of array.
+    views = [array.view() for array in (s, mesh, slopes, quaternions, centres)]
+    for view in views:
+        view.setflags(write=False)
+    s, mesh, slopes, quaternions, centres = views
+    q, r, u = out
+    evaluate(s, mesh, slopes, quaternions, centres, rule.integrals, rule.to_powers, q, r, u)
+    return out
+
+
 @dataclass(frozen=True)
 class ContinuumRing:
     """Equilibrium of a continuum rod closed into a ring.
@@ -98,21 +120,7 @@ class ContinuumRing:
 
     def _evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
         s = np.ascontiguousarray(np.atleast_1d(np.asarray(s, dtype=float)))
-        rule = gauss_rule(self.degree)
-        q, r, u = np.empty((s.size, 4)), np.empty((s.size, 3)), np.empty((s.size, 3))
-        evaluate(
-            s,
-            self.mesh,
-            self.slopes,
-            self.quaternions,
-            self.centres,
-            rule.integrals,
-            rule.to_powers,
-            q,
-            r,
-            u,
-        )
-        return q, r, u
+        return evaluate_ring(s, self.mesh, self.slopes, self.quaternions, self.centres)
 
     def centreline(self, s: ArrayLike) -> Array:
         """r(s), shape (m, 3), in units of the rod's length."""

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from dnacheck.ring.continuum.collocation import Discretisation, discretise
 from dnacheck.ring.continuum.kernels import newton as kernel
-from dnacheck.ring.continuum.kernels.condense import COLUMNS
+from dnacheck.ring.continuum.kernels.condense import COLUMNS, FINE, condense
 from dnacheck.ring.continuum.kernels.interpolate import (
-    evaluate,
     mesh_quaternions,
     slopes_on_mesh,
 )
 from dnacheck.ring.continuum.kernels.start import overlap, rolled_ring
 from dnacheck.ring.continuum.options import ContinuumOptions
+from dnacheck.ring.continuum.ring import evaluate_ring
 
 Array = NDArray[np.float64]
 
@@ -70,21 +70,7 @@ class State:
 
     def evaluate(self, s: Array, quaternions: Array) -> tuple[Array, Array, Array]:
         """q (m, 4), r (m, 3) and the laboratory strain rate u (m, 3) at the points s."""
-        q, r, u = np.empty((s.size, 4)), np.empty((s.size, 3)), np.empty((s.size, 3))
-        rule = self.disc.rule
-        evaluate(
-            s,
-            self.disc.mesh,
-            self.slopes,
-            quaternions,
-            self.centres,
-            rule.integrals,
-            rule.to_powers,
-            q,
-            r,
-            u,
-        )
-        return q, r, u
+        return evaluate_ring(s, self.disc.mesh, self.slopes, quaternions, self.centres)
 
 
 def new_state(disc: Discretisation) -> State:
@@ -140,29 +126,52 @@ def run_newton(
 ) -> bool:
     """Newton from what is in the state; True if it converged.
 
+    A step is shortened so that no mesh frame turns by more than ``options.largest_turn``.
+
     ``coefficients`` and ``rates`` (K, k, 4) are the rod at the collocation points and its
     derivative with respect to the active parameter (default none).
     """
     rule = state.disc.rule
-    state.code, iterations, state.residual, state.pivot_ratio = kernel.newton(
-        state.slopes,
-        state.loads,
-        coefficients,
-        np.zeros_like(coefficients) if rates is None else rates,
-        alpha,
-        state.disc.h,
-        rule.integrals,
-        rule.weights,
-        options.tolerance,
-        options.largest_turn,
-        options.max_iterations,
-        state.frames,
-        state.centres,
-        state.sensitivity,
-        state.stage_sensitivity,
-        state.parts,
-    )
-    state.iterations += iterations
+    rates = np.zeros_like(coefficients) if rates is None else rates
+    step = np.empty((6, 1))
+    state.code = kernel.ITERATION_LIMIT
+    for iteration in range(options.max_iterations + 1):
+        code, state.residual = condense(
+            state.slopes,
+            state.loads,
+            coefficients,
+            rates,
+            state.disc.h,
+            rule.integrals,
+            rule.weights,
+            state.frames,
+            state.centres,
+            state.sensitivity,
+            state.stage_sensitivity,
+            state.parts,
+        )
+        if code != FINE:
+            state.code, state.residual = kernel.NOT_FINITE, np.inf
+            break
+        defect, state.pivot_ratio, turn = kernel.propose(
+            state.frames, state.centres, state.sensitivity, alpha, options.largest_turn, step
+        )
+        state.residual = max(state.residual, defect)
+        neutral = state.pivot_ratio <= kernel.NEUTRAL
+        if state.residual <= options.tolerance:
+            state.code = kernel.NEUTRAL_MODE if neutral else kernel.CONVERGED
+            break
+        if not np.isfinite(state.residual + turn):
+            state.code = kernel.NOT_FINITE
+            break
+        if neutral and turn <= options.tolerance and state.residual <= kernel.NEUTRAL_RESIDUAL:
+            state.code = kernel.NEUTRAL_MODE
+            break
+        if iteration == options.max_iterations:
+            break
+        scale = min(1.0, options.largest_turn / turn) if turn > 0.0 else 1.0
+        kernel.advance(state.slopes, state.loads, state.stage_sensitivity, step, scale)
+        state.iterations += 1
     return state.code in (kernel.CONVERGED, kernel.NEUTRAL_MODE)
 
 

@@ -1,4 +1,8 @@
-"""Newton's method on the condensed collocation system, at fixed parameters."""
+"""Pieces of Newton's method on the condensed collocation system, at fixed parameters.
+
+The loop is in ``state.run_newton``: a compiled loop would hold a second copy of the sweep, which
+costs more to compile than the calls from Python cost to run.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from dnacheck.numerics.rotations import rotation_log
-from dnacheck.ring.continuum.kernels.condense import COLUMNS, condense
+from dnacheck.ring.continuum.kernels.condense import COLUMNS
 
 #: Below this ratio of pivots of the closure matrix at a solution a direction counts as neutral.
 NEUTRAL = 1e-10
@@ -19,7 +23,7 @@ _SOFT = 1e-5
 
 #: A neutral direction comes with a conserved quantity that makes one closure equation redundant;
 #: the discretisation satisfies it to its own accuracy only, so this much may be left over.
-_NEUTRAL_RESIDUAL = 1e-6
+NEUTRAL_RESIDUAL = 1e-6
 
 CONVERGED = 0
 NOT_FINITE = 1
@@ -133,91 +137,63 @@ def _largest_turn(sensitivity: Any, step: Any) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def newton(
-    slopes: Any,
-    loads: Any,
-    rod: Any,
-    rod_rate: Any,
-    alpha: float,
-    h: Any,
-    a: Any,
-    b: Any,
-    tolerance: float,
-    largest_turn: float,
-    max_iterations: int,
+def propose(
     frames: Any,
     centres: Any,
     sensitivity: Any,
-    stage_sensitivity: Any,
-    parts: Any,
-) -> tuple[int, int, float, float]:
-    """Newton iterations from ``slopes`` and ``loads``, which are overwritten.
+    alpha: float,
+    largest_turn: float,
+    step: Any,
+) -> tuple[float, float, float]:
+    """Closure defect of a swept state and the Newton step that removes it.
 
-    A step is shortened so that no mesh frame turns by more than ``largest_turn`` radians.
+    Parameters
+    ----------
+    frames, centres, sensitivity
+        From ``condense``.
+    alpha : float
+        End twist of (4.11).
+    largest_turn : float
+        A nearly neutral direction that would turn a mesh frame by more than this is left out.
+    step : (6, 1)
+        Output, the change of the loads.
 
     Returns
     -------
-    code : int
-        0 converged, 1 not finite, 2 iteration limit, 3 converged but not isolated.
-    iterations : int
-    residual : float
-        Larger of the relative collocation residual and the closure defect, at the returned state.
+    defect : float
     pivot_ratio : float
-        Smallest over largest pivot of the last 6 x 6 closure matrix.
+        Smallest over largest pivot of the 6 x 6 closure matrix.
+    turn : float
+        Largest rotation of a mesh frame in the step, radians.
     """
-    n_intervals = slopes.shape[0]
-    k = slopes.shape[1]
     end = np.empty(6)
     matrix = np.empty((6, 6))
-    step = np.empty((6, 1))
+    n_intervals = frames.shape[0] - 1
+    defect = closure_defect(frames[n_intervals], centres[n_intervals], alpha, end)
+    last = sensitivity[n_intervals]
     ratio = 1.0
-    residual = math.inf
-    for iteration in range(max_iterations + 1):
-        code, residual = condense(
-            slopes,
-            loads,
-            rod,
-            rod_rate,
-            h,
-            a,
-            b,
-            frames,
-            centres,
-            sensitivity,
-            stage_sensitivity,
-            parts,
-        )
-        if code != 0:
-            return NOT_FINITE, iteration, math.inf, ratio
-        residual = max(
-            residual, closure_defect(frames[n_intervals], centres[n_intervals], alpha, end)
-        )
-        if not math.isfinite(residual):
-            return NOT_FINITE, iteration, residual, ratio
-        last = sensitivity[n_intervals]
-        ratio = _step(last, end, NEUTRAL, matrix, step)
-        if residual <= tolerance:
-            if ratio <= NEUTRAL:
-                return NEUTRAL_MODE, iteration, residual, ratio
-            return CONVERGED, iteration, residual, ratio
-        if iteration == max_iterations:
-            break
+    turn = math.inf
+    threshold = NEUTRAL
+    for _ in range(2):
+        found = _step(last, end, threshold, matrix, step)
         turn = _largest_turn(sensitivity, step)
-        if turn > largest_turn and ratio < _SOFT:
-            _step(last, end, _SOFT, matrix, step)
-            turn = _largest_turn(sensitivity, step)
-        if not math.isfinite(turn):
-            return NOT_FINITE, iteration, residual, ratio
-        if ratio <= NEUTRAL and turn <= tolerance and residual <= _NEUTRAL_RESIDUAL:
-            return NEUTRAL_MODE, iteration, residual, ratio
-        scale = 1.0 if turn <= largest_turn else largest_turn / turn
-        for c in range(6):
-            loads[c] += scale * step[c, 0]
-        for i in range(n_intervals):
-            for j in range(k):
-                for r in range(3):
-                    total = stage_sensitivity[i, j, r, COLUMNS - 1]
-                    for c in range(6):
-                        total += stage_sensitivity[i, j, r, c] * step[c, 0]
-                    slopes[i, j, r] += scale * total
-    return ITERATION_LIMIT, max_iterations, residual, ratio
+        if threshold == NEUTRAL:
+            ratio = found
+        if turn <= largest_turn or ratio >= _SOFT:
+            break
+        threshold = _SOFT
+    return defect, ratio, turn
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def advance(slopes: Any, loads: Any, stage_sensitivity: Any, step: Any, scale: float) -> None:
+    """Move the unknowns by ``scale`` times the Newton step whose loads are ``step`` (6, 1)."""
+    for c in range(6):
+        loads[c] += scale * step[c, 0]
+    for i in range(slopes.shape[0]):
+        for j in range(slopes.shape[1]):
+            for r in range(3):
+                total = stage_sensitivity[i, j, r, COLUMNS - 1]
+                for c in range(6):
+                    total += stage_sensitivity[i, j, r, c] * step[c, 0]
+                slopes[i, j, r] += scale * total
