@@ -29,21 +29,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dnacheck.jfactor.half_chain_kernels import fill_cells, half_poses, match_pairs, weigh
-from dnacheck.jfactor.result import (
-    PER_CUBIC_ANGSTROM_IN_MOLAR,
-    JFactor,
-    JStatus,
-    LinkShare,
-)
+from dnacheck.jfactor.half_chain_window import HalfChainEstimate, PairSums, window_estimate
+from dnacheck.jfactor.result import JFactor, JStatus
 from dnacheck.jfactor.tilts import Tilt, ring_tilts
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import InputError, SolveError
-from dnacheck.numerics.statistics import HEAVY_PARETO_SHAPE, checked_weights, pareto_shape
+from dnacheck.numerics.statistics import HEAVY_PARETO_SHAPE
 from dnacheck.ring.search import RingSearch, find_rings
 
 Array = NDArray[np.float64]
 
-_BALL_VOLUME = math.pi**3 / 6.0
 _MOST_CELLS = 2_000_000
 _LARGEST_SHARE = 0.1
 """One half that carries more than this fraction of J is reported as a heavy tail."""
@@ -73,10 +68,10 @@ class HalfChainOptions:
         Threads used; the result does not depend on it.
     """
 
-    halves: int = 40_000
+    halves: int = 20_000
     batches: int = 16
     tilted: bool = True
-    radius: float = 0.45
+    radius: float = 0.6
     shells: int = 24
     windows: tuple[float, ...] = (1.0, 0.85, 0.7, 0.55)
     threads: int = 1
@@ -94,56 +89,6 @@ class HalfChainOptions:
             raise InputError(f"threads must be at least 1, not {self.threads}")
         if not all(0.0 < w <= 1.0 for w in self.windows):
             raise InputError("window radii are fractions in (0, 1]")
-
-
-@dataclass(frozen=True)
-class Window:
-    """The estimate from one window: ``radius`` as in the options, ln J, its error and pairs."""
-
-    radius: float
-    log_j: float
-    stderr: float
-    pairs: int
-
-
-@dataclass(frozen=True)
-class HalfChainEstimate:
-    """ln J (mol/L) at vanishing window and how it was reached.
-
-    Attributes
-    ----------
-    log_j, stderr : float
-        Extrapolated with a straight line in the squared radius.
-    curved_log_j, curved_stderr : float
-        The same with a parabola.
-    bias, bias_stderr : float
-        Difference of the two and its own standard error.
-    windows : tuple of Window
-        Estimates without extrapolation.
-    links : tuple of LinkShare
-    pairs : int
-    effective_halves : float
-        (sum h)^2 / sum h^2, h what one half adds; the smaller of the two sides.
-    largest_share : float
-        Largest part of J that one half carries.
-    pareto_shape : float or None
-        Tail shape of what the halves add, the larger of the two sides.
-    tilts : int
-    """
-
-    log_j: float
-    stderr: float
-    curved_log_j: float
-    curved_stderr: float
-    bias: float
-    bias_stderr: float
-    windows: tuple[Window, ...]
-    links: tuple[LinkShare, ...]
-    pairs: int
-    effective_halves: float
-    largest_share: float
-    pareto_shape: float | None
-    tilts: int
 
 
 @dataclass(frozen=True)
@@ -218,53 +163,11 @@ class _Sampler:
         return _Halves(poses, log_weights, scores)
 
 
-def polynomial_weights(shells: int, degree: int) -> Array:
-    """Weights (shells,) that extrapolate densities in shells of a 6-ball to its centre.
-
-    Shells have equal width in s = (distance / radius)^2; applied to the numbers counted in the
-    shells over the ball's volume, they give the value at s = 0 of the polynomial in s fitted by
-    least squares, with the variance of counting (inverse to the shells' volumes).
-    """
-    edges = np.linspace(0.0, 1.0, shells + 1)
-    volumes = np.diff(edges**3)
-    middles = 0.75 * np.diff(edges**4) / volumes
-    powers = middles[:, None] ** np.arange(degree + 1)
-    coefficients = np.linalg.solve(powers.T @ (volumes[:, None] * powers), np.eye(degree + 1)[0])
-    weights: Array = powers @ coefficients
-    return weights
-
-
-def crossed_error(table: Array) -> float:
-    """Standard error of the mean of a table (A, B) of statistics of independent sets.
-
-    Entry (a, b) belongs to first set a and second set b; rows and columns share sets, so the
-    variance is that of a random crossed layout: (row + column - residual mean squares) / AB.
-    """
-    a, b = table.shape
-    mean = table.mean()
-    rows = table.mean(axis=1) - mean
-    columns = table.mean(axis=0) - mean
-    rest = table - mean - rows[:, None] - columns[None, :]
-    row_square = b * np.sum(rows**2) / (a - 1)
-    column_square = a * np.sum(columns**2) / (b - 1)
-    rest_square = np.sum(rest**2) / ((a - 1) * (b - 1))
-    least = max(row_square, column_square)
-    return math.sqrt(max(row_square + column_square - rest_square, least) / (a * b))
-
-
 def _map(work: Callable[[int], object], count: int, threads: int) -> list[object]:
     if threads == 1:
         return [work(i) for i in range(count)]
     with ThreadPoolExecutor(threads) as pool:
         return list(pool.map(work, range(count)))
-
-
-@dataclass(frozen=True)
-class _Sums:
-    table: Array  # (batches a, batches b, links, shells)
-    counts: NDArray[np.int64]
-    rows: Array
-    columns: Array
 
 
 class _Grid:
@@ -288,7 +191,7 @@ class _Grid:
 
 def _matched(
     grid: _Grid, second: list[_Halves], tilts: tuple[Tilt, ...], options: HalfChainOptions
-) -> _Sums:
+) -> PairSums:
     links = sorted({tilt.link for tilt in tilts})
     roots = np.array([np.linalg.cholesky(tilt.at_joint.spread) for tilt in tilts])
     spreads = np.array([tilt.at_joint.spread for tilt in tilts])
@@ -334,7 +237,7 @@ def _matched(
 
     parts = _map(work, options.batches, options.threads)
     tables, counts, rows, columns = zip(*parts, strict=True)
-    return _Sums(
+    return PairSums(
         table=np.stack(tables, axis=1),
         counts=np.sum(counts, axis=0),
         rows=np.sum(rows, axis=0),
@@ -379,66 +282,14 @@ def half_chain_estimate(
         float(np.sqrt(np.linalg.eigvalsh(tilt.at_joint.spread[:3, :3])[-1])) for tilt in tilts
     )
     grid = _Grid(_Halves.joined(first), np.repeat(np.arange(options.batches), per_batch), reach)
-    return _estimate(chain, _matched(grid, second, tilts, options), tilts, options)
-
-
-def _estimate(
-    chain: Chain, sums: _Sums, tilts: tuple[Tilt, ...], options: HalfChainOptions
-) -> HalfChainEstimate:
-    per_batch = options.halves // options.batches
-    shells = options.shells
-    if not sums.counts.any():
-        raise SolveError(
-            f"half chains of {chain.name}: none of {per_batch * options.batches} squared pairs "
-            "met; draw more halves, widen the window, or tilt"
-        )
-    unit = math.log(PER_CUBIC_ANGSTROM_IN_MOLAR) - 3.0 * math.log(chain.rise_A)
-    volume = _BALL_VOLUME * options.radius**6
-    by_link = sums.table / (per_batch**2 * volume)
-    table = by_link.sum(axis=2)
-
-    def logarithm(values: Array) -> tuple[float, float]:
-        mean = float(values.mean())
-        if not mean > 0.0:
-            return -math.inf, math.inf
-        return math.log(mean) + unit, crossed_error(values) / mean
-
-    line, curve = polynomial_weights(shells, 1), polynomial_weights(shells, 2)
-    log_j, stderr = logarithm(table @ line)
-    curved, curved_stderr = logarithm(table @ curve)
-    difference = table @ (curve - line)
-    mean = float((table @ line).mean())
-    windows = []
-    for fraction in options.windows:
-        inside = max(round(fraction**2 * shells), 1)
-        value, error = logarithm(table[:, :, :inside].sum(axis=2) / (inside / shells) ** 3)
-        radius = options.radius * math.sqrt(inside / shells)
-        windows.append(Window(radius, value, error, int(sums.counts[:inside].sum())))
-    links = sorted({tilt.link for tilt in tilts})
-    shares = [
-        LinkShare(link, -value, error)
-        for link, (value, error) in zip(
-            links, (logarithm(by_link[:, :, i] @ line) for i in range(len(links))), strict=True
-        )
-        if math.isfinite(value)
-    ]
-    sides = (sums.rows, sums.columns)
-    tails = [pareto_shape(checked_weights(side)) for side in sides]
-    known = [tail for tail in tails if tail is not None]
-    return HalfChainEstimate(
-        log_j=log_j,
-        stderr=stderr,
-        curved_log_j=curved,
-        curved_stderr=curved_stderr,
-        bias=float(difference.mean()) / mean,
-        bias_stderr=crossed_error(difference) / abs(mean),
-        windows=tuple(windows),
-        links=tuple(sorted(shares, key=lambda share: share.minus_lnJ)),
-        pairs=int(sums.counts.sum()),
-        effective_halves=min(float(s.sum() ** 2 / np.square(s).sum()) for s in sides),
-        largest_share=max(float(s.max() / s.sum()) for s in sides),
-        pareto_shape=max(known) if known else None,
-        tilts=len(tilts),
+    return window_estimate(
+        chain,
+        _matched(grid, second, tilts, options),
+        sorted({tilt.link for tilt in tilts}),
+        len(tilts),
+        per_batch,
+        options.radius,
+        options.windows,
     )
 
 
