@@ -46,8 +46,8 @@ class ModelSettings:
 
     angles: str
     """Name of an angle set, or path of a TOML file."""
-    twist_ratio: float
-    """Twisting over bending stiffness, K_tau / K_theta."""
+    twist_ratio: float | None
+    """Twisting over bending stiffness, K_tau / K_theta; None leaves it to the angle set, or 1.5."""
     persistence_length: float
     """Å."""
     rise: float
@@ -235,9 +235,8 @@ def model_options(function: Function) -> Function:
                 "--twist-ratio",
                 "model__twist_ratio",
                 type=PositiveNumber(),
-                default=1.5,
-                show_default=True,
-                help="Twisting over bending stiffness.",
+                default=None,
+                help="Twisting over bending stiffness.  [default: 1.5, or the angle set's own]",
             ),
             click.option(
                 "--persistence-length",

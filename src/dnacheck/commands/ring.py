@@ -1,0 +1,288 @@
+"""``dnacheck ring``: ring equilibria of one molecule or of every record of a FASTA file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from dnacheck.commands.common import (
+    ContinuumSettings,
+    ModelSettings,
+    RingSettings,
+    RunSettings,
+    common_options,
+    continuum_options,
+    model_options,
+    ring_options,
+    target_argument,
+)
+from dnacheck.commands.output import note, print_json, progress
+
+if TYPE_CHECKING:
+    from dnacheck.model.chain import Chain
+    from dnacheck.model.molecules import Molecule
+    from dnacheck.ring.continuum import ContinuumRing
+    from dnacheck.ring.discrete import DiscreteRing
+
+EXIT_BAD_INPUT = 2
+EXIT_NOT_CONVERGED = 3
+# Minima this close to the lowest, in RT, share the molecule with it.
+_CLOSE_RT = 1.0
+# Below this, in RT per square radian, the softest motion of a ring swings by more than half a
+# radian at room temperature, and its energy alone says little about J.
+_SOFT_RT = 5.0
+
+
+@click.command(epilog="Example:  dnacheck ring 11T15 --structure ring.pdb")
+@target_argument
+@click.option(
+    "--structure",
+    type=click.Path(path_type=Path, dir_okay=False),
+    default=None,
+    help="Write the lowest ring as a .pdb or .gro file.",
+)
+@model_options
+@ring_options
+@continuum_options
+@common_options
+def command(
+    target: str,
+    structure: Path | None,
+    model: ModelSettings,
+    ring: RingSettings,
+    continuum: ContinuumSettings,
+    run: RunSettings,
+) -> int | None:
+    """Closed rings of TARGET: energies, link, writhe and stability, lowest first.
+
+    TARGET is an embedded molecule such as 11T15, a sequence of A, C, G, T, or a FASTA file. The
+    discrete base-pair model and the continuum rod are solved independently and compared.
+    """
+    from dnacheck.model.molecules import read_target
+    from dnacheck.numerics.outcome import InputError
+
+    molecules = list(read_target(target))
+    good = [molecule for molecule in molecules if not isinstance(molecule, InputError)]
+    if structure is not None and len(molecules) > 1:
+        raise InputError(
+            f"--structure: '{target}' holds {len(molecules)} records; give one molecule"
+        )
+    if len(molecules) == 1 and not good:
+        raise _as_error(molecules[0])
+    records: list[dict[str, Any]] = []
+    complete = True
+    with progress("rings", len(good), run.quiet) as advance:
+        for molecule in molecules:
+            if isinstance(molecule, InputError):
+                note(str(molecule))
+                continue
+            record, converged = _solve(molecule, structure, model, ring, continuum)
+            complete = complete and converged
+            records.append(record)
+            advance(1)
+            if not run.json:
+                _print(record)
+            for warning in record["warnings"]:
+                note(f"{record['target']}: {warning}", run.quiet)
+    if run.json:
+        print_json(records[0] if len(molecules) == 1 else {"target": target, "molecules": records})
+    if len(good) < len(molecules):
+        return EXIT_BAD_INPUT
+    return None if complete else EXIT_NOT_CONVERGED
+
+
+def _as_error(item: Any) -> Exception:
+    assert isinstance(item, Exception)
+    return item
+
+
+def _solve(
+    molecule: Molecule,
+    structure: Path | None,
+    model: ModelSettings,
+    ring: RingSettings,
+    continuum: ContinuumSettings,
+) -> tuple[dict[str, Any], bool]:
+    """The JSON record of one molecule, and whether every model asked for converged."""
+    from dnacheck.model.chain import build_chain
+
+    chain = build_chain(molecule, **model.chain_arguments())
+    warnings = list(chain.warnings)
+    equilibria: list[dict[str, Any]] = []
+    smooth = discrete = None
+    converged = True
+    if ring.model in ("continuum", "both"):
+        smooth, entries = _continuum(chain, ring, continuum, warnings)
+        equilibria += entries
+        converged = smooth is not None
+    if ring.model in ("discrete", "both"):
+        discrete, entries = _discrete(chain, ring, warnings)
+        equilibria += entries
+        converged = converged and discrete is not None
+    comparison = None
+    if smooth is not None and discrete is not None:
+        from dnacheck.ring.reconstruct import reconstruct, rms_difference
+
+        comparison = {
+            "energy_difference_percent": 100.0 * (smooth.energy / discrete.energy - 1.0),
+            "rms_A": rms_difference(reconstruct(smooth).centres, discrete.centres, chain.rise_A),
+        }
+    if structure is not None:
+        _write(structure, chain, smooth, discrete)
+    record = {
+        "target": molecule.name,
+        "n_bp": chain.n_steps,
+        "angles": chain.angle_set,
+        "twist_ratio": chain.twist_ratio,
+        "persistence_length_A": chain.persistence_length_A,
+        "rise_A": chain.rise_A,
+        "strand": chain.letters,
+        "equilibria": equilibria,
+        "comparison": comparison,
+        "warnings": warnings,
+    }
+    return record, converged
+
+
+def _discrete(
+    chain: Chain, ring: RingSettings, warnings: list[str]
+) -> tuple[DiscreteRing | None, list[dict[str, Any]]]:
+    from dnacheck.ring.search import SearchOptions, find_rings
+
+    found = find_rings(chain, SearchOptions(links=ring.link))
+    if found.failed_starts:
+        warnings.append(
+            f"discrete: {found.failed_starts} of {found.starts} starts did not converge; "
+            "minima may be missing"
+        )
+    if not found.equilibria:
+        warnings.append(f"discrete: {found.status.value}")
+        return None, []
+    entries = [
+        {
+            "model": "discrete",
+            "energy_RT": item.energy_RT,
+            "energy_reduced": item.energy,
+            "bend_RT": item.bend_RT,
+            "twist_RT": item.twist_RT,
+            "link": item.link,
+            "writhe": item.writhe,
+            "stable": item.stable,
+            "smallest_eigenvalue": item.smallest_eigenvalue,
+            "residual": item.residual,
+            "iterations": item.iterations,
+            "seconds": item.seconds,
+            "status": item.status.value,
+        }
+        for item in found.equilibria
+    ]
+    lowest = found.lowest
+    close = [e for e in entries[1:] if e["energy_RT"] - lowest.energy_RT < _CLOSE_RT]
+    if close:
+        links = ", ".join(str(entry["link"]) for entry in close)
+        warnings.append(
+            f"discrete: {len(close)} more minima within {_CLOSE_RT:g} RT of the lowest (link "
+            f"{links}); all of them count for J"
+        )
+    if lowest.smallest_eigenvalue * chain.energy_scale_RT < _SOFT_RT:
+        warnings.append(
+            "discrete: the softest motion of the ring, its register, costs almost no energy; use "
+            "dnacheck jfactor, which integrates over it"
+        )
+    return lowest, entries
+
+
+def _continuum(
+    chain: Chain, ring: RingSettings, continuum: ContinuumSettings, warnings: list[str]
+) -> tuple[ContinuumRing | None, list[dict[str, Any]]]:
+    from dnacheck.model.rod import RodOptions, build_rod
+    from dnacheck.ring.continuum import lowest_continuum_ring
+
+    rod = build_rod(
+        chain,
+        RodOptions(
+            filter_width=continuum.filter_width,
+            intervals=continuum.intervals,
+            degree=continuum.degree,
+        ),
+    )
+    warnings += [f"continuum: {text}" for text in rod.warnings]
+    found = lowest_continuum_ring(rod, ring.link)
+    scale = rod.energy_scale_RT
+    entries = [
+        {
+            "model": "continuum",
+            "energy_RT": item.energy_RT,
+            "energy_reduced": item.energy,
+            "bend_RT": scale * item.bend,
+            "twist_RT": scale * item.twist,
+            "link": item.link,
+            "writhe": item.writhe,
+            "stable": item.stable,
+            "smallest_eigenvalue": None,
+            "residual": item.residual,
+            "iterations": item.iterations,
+            "seconds": item.seconds,
+            "status": item.status.value,
+        }
+        for item in found.equilibria
+    ]
+    minima = [item for item in found.equilibria if item.stable is not False]
+    if not minima:
+        warnings.append(f"continuum: {found.status.value}")
+        return None, entries
+    return minima[0], entries
+
+
+def _write(
+    path: Path, chain: Chain, smooth: ContinuumRing | None, discrete: DiscreteRing | None
+) -> None:
+    from dnacheck.md.structure_file import write_ring_structure
+    from dnacheck.numerics.outcome import SolveError
+
+    if discrete is not None:
+        centres, frames = discrete.centres, discrete.frames
+    elif smooth is not None:
+        from dnacheck.ring.reconstruct import reconstruct
+
+        rebuilt = reconstruct(smooth)
+        centres, frames = rebuilt.centres, rebuilt.frames
+    else:
+        raise SolveError(f"{chain.name}: no ring converged, so '{path}' was not written")
+    write_ring_structure(path, centres, frames, chain.letters, chain.rise_A, chain.name)
+
+
+def _print(record: dict[str, Any]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    ratio = record["twist_ratio"]
+    stiffness = "own stiffness" if ratio is None else f"twist ratio {ratio:g}"
+    title = f"{record['target']}: {record['n_bp']} bp, {record['angles']} angles, {stiffness}"
+    table = Table(title=Text(title), title_justify="left", box=None, pad_edge=False)
+    for head in ("model", "energy/RT", "reduced", "bend/RT", "twist/RT", "link", "writhe"):
+        table.add_column(head, justify="left" if head == "model" else "right")
+    table.add_column("stable")
+    table.add_column("residual", justify="right")
+    for item in record["equilibria"]:
+        stable = {True: "yes", False: "saddle", None: "unknown"}[item["stable"]]
+        table.add_row(
+            item["model"],
+            f"{item['energy_RT']:.4f}",
+            f"{item['energy_reduced']:.6f}",
+            f"{item['bend_RT']:.4f}",
+            f"{item['twist_RT']:.4f}",
+            str(item["link"]),
+            f"{item['writhe']:+.4f}",
+            stable,
+            f"{item['residual']:.0e}",
+        )
+    console = Console(highlight=False, soft_wrap=True)
+    console.print(table)
+    if record["comparison"] is not None:
+        gap = record["comparison"]["energy_difference_percent"]
+        rms = record["comparison"]["rms_A"]
+        console.print(f"lowest continuum - discrete: {gap:+.3f} % in energy, rms {rms:.3f} Å")
