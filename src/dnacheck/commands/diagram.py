@@ -117,7 +117,7 @@ def _components(
     import math
     from dataclasses import replace
 
-    from dnacheck.model.chain import build_chain
+    from dnacheck.model.chain import TWIST_RATIO, build_chain
     from dnacheck.model.molecules import read_target
     from dnacheck.model.rod import RodOptions, build_rod
     from dnacheck.numerics.outcome import InputError
@@ -130,7 +130,8 @@ def _components(
     limits = None if bounds is None else Bounds(turn * bounds[0], turn * bounds[1])
     alpha = None if start is None else turn * start
     if target == "perfect":
-        rod = perfect_rod(n_bp, model.twist_ratio, model.persistence_length, model.rise)
+        ratio = TWIST_RATIO if model.twist_ratio is None else model.twist_ratio
+        rod = perfect_rod(n_bp, ratio, model.persistence_length, model.rise)
         options = replace(diagram.PERFECT, max_points=max_points)
         if search:
             raise InputError("the perfect diagram is connected: leave out --components")
