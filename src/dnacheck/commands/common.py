@@ -52,8 +52,8 @@ class ModelSettings:
     """Å."""
     rise: float
     """Å per base-pair step."""
-    a_tracts: Literal["auto", "none"] | tuple[int, int]
-    """Steps with the A-tract twist: by rule, none, or first and last (0-based, both included)."""
+    a_tracts: Literal["auto", "tracts-only", "none"] | tuple[int, int]
+    """Steps with the A-tract twist: by a rule, none, or first and last (0-based, included)."""
 
     def chain_arguments(self) -> dict[str, Any]:
         """Keyword arguments of :func:`dnacheck.model.chain.build_chain`."""
@@ -62,7 +62,7 @@ class ModelSettings:
             "twist_ratio": self.twist_ratio,
             "persistence_length_A": self.persistence_length,
             "rise_A": self.rise,
-            "a_tracts": self.a_tracts,
+            "a_tracts": self.a_tracts if isinstance(self.a_tracts, str) else (self.a_tracts,),
         }
 
 
@@ -120,14 +120,14 @@ class LinkChoice(click.ParamType):
 
 
 class StepRange(click.ParamType):
-    """``auto``, ``none`` or ``A..B``, 0-based steps, both included."""
+    """``auto``, ``tracts-only``, ``none`` or ``A..B``, 0-based steps, both included."""
 
-    name = "auto|none|A..B"
+    name = "auto|tracts-only|none|A..B"
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> str | tuple[int, int]:
-        if isinstance(value, tuple) or value in ("auto", "none"):
+        if isinstance(value, tuple) or value in ("auto", "tracts-only", "none"):
             return value
         match = re.fullmatch(r"([0-9]{1,9})\.\.([0-9]{1,9})", value)
         if match is None:

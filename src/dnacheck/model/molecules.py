@@ -106,12 +106,12 @@ def read_target(target: str) -> Iterator[Molecule | InputError]:
     path = Path(target)
     looks_like_path = "/" in target or "." in target or "\\" in target
     try:
-        is_file = path.exists()
+        is_file = bool(target.strip()) and path.exists()
     except OSError:
         is_file = False
     if is_file or looks_like_path:
         yield from read_fasta(path)
-    elif target.strip() and not re.fullmatch(r"[A-Za-z\s]+", target):
+    elif not re.fullmatch(r"[A-Za-z\s]*", target):
         names = ", ".join(embedded_names())
         raise InputError(
             f"target '{target}' is neither an embedded molecule ({names}), nor a file, "
