@@ -60,6 +60,7 @@ md: $(STAMP) ## tests that run OpenMM dynamics
 	$(PYTEST) -m md
 
 oracles: $(STAMP) ## comparisons with independent programs; absent ones are skipped
+	@sh validation/oracles/auto07p/install.sh
 	$(PYTEST) -m oracle
 
 coverage: $(STAMP) ## line coverage, compiled kernels included (JIT off for the coverage run)
