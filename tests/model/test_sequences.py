@@ -1,0 +1,118 @@
+"""Sequences, molecules and targets: what is accepted, what is refused and how."""
+
+import csv
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dnacheck.model.a_tracts import automatic_regions, parse_regions, tract_regions
+from dnacheck.model.data_files import data_directory
+from dnacheck.model.molecules import embedded, embedded_names, read_fasta, read_target
+from dnacheck.model.sequence import STEP_NAMES, Sequence, parse_sequence
+from dnacheck.numerics.outcome import InputError
+
+letters = st.text(alphabet="ACGT", min_size=10, max_size=60)
+
+
+@given(letters)
+def test_lower_case_and_white_space_are_accepted(text):
+    spaced = "\n".join(text[i : i + 7].lower() for i in range(0, len(text), 7))
+    assert parse_sequence(spaced, "x").letters == text
+
+
+@given(letters)
+def test_reverse_complement_twice_is_the_same_molecule(text):
+    sequence = Sequence("x", text)
+    assert sequence.reverse_complement().reverse_complement() == sequence
+    pairs = {"A": "T", "T": "A", "C": "G", "G": "C"}
+    assert sequence.reverse_complement().letters == "".join(pairs[c] for c in reversed(text))
+
+
+@given(letters)
+def test_steps_are_read_one_by_one_and_the_last_leads_back(text):
+    names = [STEP_NAMES[i] for i in Sequence("x", text).step_indices()]
+    assert names == [text[i] + text[(i + 1) % len(text)] for i in range(len(text))]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "empty"),
+        ("   \n", "empty"),
+        ("ACGTACGTA", "9 base pairs are too few"),
+        ("ACGTACGTACGTACGTNACGT", "position 17: 'N' is not one of A, C, G, T"),
+        ("ACGUACGTACGT", "position 4: 'U' is not one of A, C, G, T"),
+        ("ACGTACGTACGT*", "position 13"),
+    ],
+)
+def test_bad_sequences_name_the_place(text, message):
+    with pytest.raises(InputError, match=r"sequence 'foo'") as caught:
+        parse_sequence(text, "foo")
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_eleven_molecules_have_the_lengths_their_names_give():
+    """Length is 132 plus both adaptors; 17A11 lost one base (Section X)."""
+    assert len(embedded_names()) == 11
+    for name in embedded_names():
+        expected = 132 + int(name[:2]) + int(name[3:]) - (1 if name == "17A11" else 0)
+        assert len(embedded(name).sequence) == expected
+
+
+def test_published_tables_speak_of_the_same_molecules():
+    for table in ("table2_ring_energies", "table3_free_energies"):
+        with (data_directory() / "published" / f"{table}.csv").open() as handle:
+            assert tuple(row["name"] for row in csv.DictReader(handle)) == embedded_names()
+
+
+def test_the_tract_rule_gives_the_regions_that_table_2_demands():
+    for name in embedded_names():
+        molecule = embedded(name)
+        assert automatic_regions(molecule.sequence.letters) == molecule.a_tract_regions
+
+
+def test_tract_rule_parts_distant_tracts_and_stays_inside():
+    assert automatic_regions("A" * 6 + "C" * 21 + "T" * 7) == ((0, 33),)
+    assert automatic_regions("A" * 6 + "C" * 22 + "T" * 7) == ((0, 7), (26, 34))
+    assert automatic_regions("ACGT" * 10) == ()
+    assert tract_regions("CC" + "A" * 6 + "CC") == ((2, 6),)
+
+
+@pytest.mark.parametrize("text", ["5", "a..b", "7..3", "0..20", "1..2,", "-1..3"])
+def test_bad_regions_are_refused(text):
+    with pytest.raises(InputError, match="A-tract region"):
+        parse_regions(text, 20)
+
+
+def test_fasta_gives_all_records_and_names_the_bad_one(tmp_path):
+    path = tmp_path / "m.fasta"
+    path.write_text(">a first\nACGTACGT\nACGT\n>b\nACGTXACGTACGT\n>\nTTTTTTTTTTTT\n")
+    first, bad, last = read_fasta(path)
+    assert (first.name, first.sequence.letters) == ("a", "ACGTACGTACGT")
+    assert "sequence 'b', position 5: 'X'" in str(bad)
+    assert last.name == "record 3"
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [(b"", "no FASTA record"), (b"ACGT\n", "FASTA"), (b"\xff\xfe>\x00", "not a text file")],
+)
+def test_files_that_are_no_fasta(tmp_path, content, message):
+    path = tmp_path / "m.fasta"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=message):
+        list(read_fasta(path))
+
+
+def test_targets():
+    assert next(read_target("11t15")) == embedded("11T15")
+    assert next(read_target("acgtacgtacgt")).sequence.letters == "ACGTACGTACGT"
+    for target, message in (
+        ("12X99", "neither an embedded molecule"),
+        ("missing.fasta", "missing.fasta"),
+        ("foo", "position 1: 'F'"),
+    ):
+        with pytest.raises(InputError, match=message):
+            list(read_target(target))
