@@ -280,7 +280,8 @@ def _print(record: dict[str, Any]) -> None:
             stable,
             f"{item['residual']:.0e}",
         )
-    console = Console(highlight=False, soft_wrap=True)
+    # No column may be cut where the output is not a terminal, or a narrow one.
+    console = Console(highlight=False, soft_wrap=True, width=120)
     console.print(table)
     if record["comparison"] is not None:
         gap = record["comparison"]["energy_difference_percent"]
