@@ -72,3 +72,11 @@ def test_coupling_that_does_not_average_out_is_refused():
     twisted[:, 0] = 0.6  # with helical twist the same coupling averages out
     rod = build_rod(Chain("helix", twisted, np.tile(coupled, (120, 1, 1))))
     assert rod.stiffness_anisotropy < RodOptions().anisotropy_limit
+
+
+def test_a_stiffness_that_is_not_positive_is_refused():
+    chain = molecule_chain("11T15")
+    stiffness = np.array(chain.stiffness)
+    stiffness[7] = np.diag([1.5, 1.0, 0.0])
+    with pytest.raises(InputError, match="step 8: not positive definite"):
+        build_rod(_with_stiffness(chain, stiffness))

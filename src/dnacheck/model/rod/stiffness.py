@@ -71,9 +71,11 @@ def rod_stiffness(stiffness: Array, phase: Array, options: RodOptions) -> RodSti
         Not positive definite, or too much anisotropy or coupling survives the average.
     """
     n = len(stiffness)
+    smallest = np.linalg.eigvalsh(stiffness)[:, 0]
+    if not np.all(smallest > 0.0):
+        step = int(np.argmin(smallest))
+        raise InputError(f"stiffness of step {step + 1}: not positive definite; correct its matrix")
     compliance = _body_compliance(stiffness)
-    if not np.all(np.linalg.eigvalsh(compliance) > 0.0):
-        raise InputError("the stiffness of a step is not positive definite")
     cosine, sine = np.cos(phase), np.sin(phase)
     turn = np.zeros((n, 3, 3))
     turn[:, 0, 0] = turn[:, 1, 1] = cosine

@@ -1,9 +1,12 @@
 """Paths from problems that are easy to solve to the rod at hand, for starts that Newton rejects.
 
 Three quantities lead from one problem to another: gamma, the fraction of the intrinsic curvature
-(Section VII); the end twist alpha; and a factor on K3. What each path is good for was measured on
-random sequences over K3/K1 from 0.05 to 20: bringing in the curvature or the softness of twist
-serves soft twist, bringing in the end twist serves stiff twist, where the planar ring has buckled.
+(Section VII); the end twist alpha; and a factor on K3. Soft twist is served by bringing in the
+curvature, or by softening the twist from K3 = K1; stiff twist, where the flat ring has buckled at
+the wanted alpha, by bringing in the end twist, after or together with the curvature. With all five
+paths every one of 400 random sequences of 60-400 bp, K3/K1 from 0.05 to 20, has ended in a stable
+ring; without the two that start from little twist and little curvature one in thirty did not at
+K3/K1 of 5 and more.
 """
 
 from __future__ import annotations
@@ -11,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -69,16 +73,24 @@ def detours(state: State, alpha: float, turn: float, options: ContinuumOptions) 
     ratio = math.log(rod.twist_stiffness / rod.bend_stiffness)
     goal = Problem(1.0, 0.0, alpha)
     small = math.copysign(_SOME_TWIST, alpha)
-    untwisted = (Problem(1.0, 0.0, small), small)
-    straight = (Problem(_SOME_CURVATURE, 0.0, alpha), alpha)
-    isotropic = (Problem(1.0, -ratio, alpha), alpha)
-    order = [untwisted, straight, isotropic] if ratio > 0.0 else [straight, isotropic, untwisted]
-    for start, start_alpha in order:
-        start_from_perfect_ring(state, start_alpha, register_roll(state.disc, start_alpha) + turn)
+    bare = Problem(_SOME_CURVATURE, 0.0, small)
+    curve_then_twist = [bare, Problem(1.0, 0.0, small), goal]
+    both = [bare, goal]
+    twist_in = [Problem(1.0, 0.0, small), goal]
+    curve_in = [Problem(_SOME_CURVATURE, 0.0, alpha), goal]
+    soften = [Problem(1.0, -ratio, alpha), goal]
+    if ratio > 0.0:
+        paths = [twist_in, curve_then_twist, both, curve_in, soften]
+    else:
+        paths = [curve_in, soften, twist_in, curve_then_twist, both]
+    for path in paths:
+        start = path[0]
+        roll = register_roll(state.disc, start.alpha) + turn
+        start_from_perfect_ring(state, start.alpha, roll)
         coefficients = state.disc.coefficients(start.gamma, math.exp(start.log_twist_factor))
-        arrived = run_newton(state, coefficients, start_alpha, options) and _follow(
-            state, start, goal, options
-        )
+        arrived = run_newton(state, coefficients, start.alpha, options)
+        for here, there in pairwise(path):
+            arrived = arrived and _follow(state, here, there, options)
         if not arrived and state.code in (kernel.CONVERGED, kernel.NEUTRAL_MODE):
             # what is in the state solves another problem of the family
             state.code = kernel.ITERATION_LIMIT

@@ -21,6 +21,8 @@ _SAME = 1e-5
 # Minima this far above the lowest, in RT, change the J factor by less than a part in a thousand.
 _WINDOW_RT = 8.0
 _ALL_LINKS_REACH = 2
+# With K3 of a hundredth of K1 and less, hundreds of links have nearly the same energy.
+_MOST_LINKS = 13
 _ALL_REGISTERS = 8
 
 
@@ -62,18 +64,15 @@ def candidate_links(rod: Rod) -> tuple[int, ...]:
     """Links that "auto" searches, nearest to the relaxed twist first.
 
     The two around the relaxed twist, and every other whose twisting energy as a flat ring stays
-    within 8 RT or half the bending energy of a circle.
+    within 8 RT or half the bending energy of a circle; 13 at most.
     """
     turns = rod.relaxed_turns
     allowed = max(_WINDOW_RT / rod.energy_scale_RT, np.pi**2 * rod.bend_stiffness)
     reach = float(np.sqrt(2.0 * allowed / rod.twist_stiffness)) / (2.0 * np.pi)
+    reach = min(max(reach, 1.0), float(_MOST_LINKS))
     around = range(int(np.floor(turns - reach)), int(np.ceil(turns + reach)) + 1)
-    return tuple(
-        sorted(
-            (link for link in around if abs(link - turns) <= max(reach, 1.0)),
-            key=lambda link: abs(link - turns),
-        )
-    )
+    inside = (link for link in around if abs(link - turns) <= reach)
+    return tuple(sorted(inside, key=lambda link: abs(link - turns))[:_MOST_LINKS])
 
 
 def lowest_continuum_ring(
