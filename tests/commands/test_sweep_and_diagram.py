@@ -19,6 +19,16 @@ def test_sweep_json(capsys):
             assert energy == pytest.approx(bend + twist)
 
 
+def test_corrected_sweep_is_closer_to_the_discrete_one(capsys):
+    gaps = []
+    for flags in ([], ["--corrected"]):
+        assert main(["sweep", "11A17", "--ratios", "1.5", "--json", *flags]) == 0
+        one, two = json.loads(capsys.readouterr().out)["sweeps"]
+        gaps.append(abs(one["energy"][0] / two["energy"][0] - 1.0))
+    assert gaps[0] > 0.002
+    assert gaps[1] < 0.001
+
+
 def test_sweep_table_and_picture(capsys, tmp_path):
     picture = tmp_path / "sweep.svg"
     arguments = ["sweep", "08T15", "--ratios", "1", "--model", "discrete", "--plot", str(picture)]
@@ -57,6 +67,7 @@ def test_diagram_json_and_picture(capsys, tmp_path):
     marks = [p for p in branch["special"] if p["kind"] == "mark"]
     assert min(p["energy"] for p in marks) == pytest.approx(10.536, abs=0.005)
     assert "closed" in branch["status"]
+    assert len(branch["link"]) == len(branch["alpha"])
     assert picture.stat().st_size > 10_000
 
 

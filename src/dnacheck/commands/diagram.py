@@ -87,7 +87,7 @@ def command(
         found = _components(target, bounds, start, search, max_points, n_bp, model, continuum)
     except BranchError as error:
         return _failed(target, error, run)
-    data = [component_data(component) for component in found]
+    data = [component_data(component, link=run.json) for component in found]
     if plot is not None:
         _draw(plot, target, found, data)
         note(f"picture written to {plot}", run.quiet or run.json)

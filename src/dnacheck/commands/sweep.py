@@ -76,6 +76,11 @@ class RatioRange(click.ParamType):
     show_default=True,
     help="Which rings to follow.",
 )
+@click.option(
+    "--corrected",
+    is_flag=True,
+    help="Continuum energies with the steps' own compliance (see docs/continuation.md).",
+)
 @click.option("--plot", type=click.Path(path_type=Path), default=None, help="Write a picture.")
 @model_options
 @continuum_options
@@ -84,6 +89,7 @@ def command(
     target: str,
     ratios: tuple[float, ...],
     which: str,
+    corrected: bool,
     plot: Path | None,
     model: ModelSettings,
     continuum: ContinuumSettings,
@@ -117,7 +123,8 @@ def command(
             chain = build_chain(molecule, **model.chain_arguments())
             for kind in models:
                 if kind == "continuum":
-                    sweep = sweep_continuum(build_rod(chain, rod_options), ratios)
+                    rod = build_rod(chain, rod_options)
+                    sweep = sweep_continuum(rod, ratios, corrected_for=chain if corrected else None)
                 else:
                     sweep = sweep_discrete(chain, ratios)
                 complete = complete and not sweep.missing.size
@@ -127,7 +134,9 @@ def command(
         _draw(plot, records)
         note(f"picture written to {plot}", run.quiet or run.json)
     if run.json:
-        print_json({"target": target, "angles": model.angles, "sweeps": records})
+        print_json(
+            {"target": target, "angles": model.angles, "corrected": corrected, "sweeps": records}
+        )
     else:
         for record in records:
             _print(record)

@@ -142,6 +142,7 @@ def test_two_directions_join(rod, component):
     assert ring.energy == pytest.approx(branch.of_kind(Kind.MARK)[0].energy, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_other_components_lie_higher(rod):
     """That the component of the lowest ring is the lowest is found, not assumed."""
     found = components(rod, [0.4, 2.0], Bounds(-8.0, 8.0))
@@ -263,12 +264,23 @@ def test_diagrams_of_the_eleven(name):
 
 def test_robustness_of_one_molecule():
     """Figure 10 at its middle ratio and corners."""
-    data = robustness(molecule_chain("08T15"), ratios=(0.5, 1.0, 1.5), span="molecule")
+    fits = ((10, 4), (12, 5), (16, 6), (20, 4), (20, 6))
+    data = robustness(molecule_chain("08T15"), ratios=(0.5, 1.5), fits=fits, span="molecule")
     assert data["spread_fit"] <= 0.05
     assert data["spread_width"] <= 0.05
     assert data["spread_all"] <= 0.15
     assert data["farthest"] <= 0.15
     assert not data["refused"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ELEVEN)
+def test_robustness_of_the_eleven(name):
+    """Every choice of the paper; pieces over the molecule."""
+    data = robustness(molecule_chain(name), span="molecule")
+    assert data["spread_fit"] <= 0.05
+    assert data["spread_width"] <= 0.05
+    assert data["spread_all"] <= 0.15
 
 
 def test_robustness_with_pieces_over_the_padded_molecule():
