@@ -39,7 +39,9 @@ def test_json_has_the_promised_members(capsys):
     code, out, _ = run(capsys, "11T15", "--json", "--quiet")
     record = json.loads(out)
     assert code == 0
-    assert {"target", "n_bp", "angles", "twist_ratio", "persistence_length_A", "rise_A"} < set(record)
+    assert {"target", "n_bp", "angles", "twist_ratio", "persistence_length_A", "rise_A"} < set(
+        record
+    )
     assert {"strand", "equilibria", "comparison", "warnings"} < set(record)
     assert all(set(item) == KEYS for item in record["equilibria"])
     assert record["n_bp"] == 158

@@ -80,9 +80,6 @@ def test_other_strand_is_the_same_shape_in_the_midstep_form_only():
         for strand in (sequence, sequence.reverse_complement()):
             # Only the steps between the molecule's own base pairs: the closing one is not shared.
             angles = build_chain(strand, "trifonov", step_form=form).ground[:-1]
-            centres, _ = chain_frames(angles, form)
-            # The step lengths lie along d3 of the first frame of a step on either strand, so
-            # compare the rotation from end to end.
             _, frames = chain_frames(angles, form)
             ends.setdefault(form, []).append(Rotation.from_matrix(frames[-1]).magnitude())
     assert ends["midstep"][0] == pytest.approx(ends["midstep"][1], abs=1e-12)

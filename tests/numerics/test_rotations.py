@@ -100,7 +100,7 @@ def test_wedge_angles_at_ninety_degrees_reproduce_the_rotation(theta):
 
 
 def test_printed_arcsin_fails_beyond_ninety_degrees():
-    """Section IX prints arcsin; a twist of 120 degrees shows why atan2 is used (negative control)."""
+    """Negative control: the arcsin that Section IX prints, at a twist of 120 degrees."""
     tau = np.deg2rad(120.0)
     matrix = wedge(tau, 0.1, 0.2)
     printed = -np.arcsin(matrix[0, 1] / np.cos(-np.arcsin(matrix[2, 1])))

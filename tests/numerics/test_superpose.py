@@ -10,7 +10,7 @@ from dnacheck.numerics.superpose import superpose
 def test_rigid_motion_is_undone():
     rng = np.random.default_rng(3)
     points = rng.standard_normal((40, 3))
-    moved = Rotation.random(rng=rng).apply(points) + [3.0, -2.0, 9.0]
+    moved = Rotation.random(rng=rng).apply(points) + np.array([3.0, -2.0, 9.0])
     back, rms = superpose(moved, points)
     assert back == pytest.approx(points, abs=1e-13)
     assert rms < 1e-13

@@ -69,8 +69,8 @@ def command(
         raise InputError(
             f"--structure: '{target}' holds {len(molecules)} records; give one molecule"
         )
-    if len(molecules) == 1 and not good:
-        raise _as_error(molecules[0])
+    if len(molecules) == 1 and isinstance(molecules[0], InputError):
+        raise molecules[0]
     records: list[dict[str, Any]] = []
     complete = True
     with progress("rings", len(good), run.quiet) as advance:
@@ -91,11 +91,6 @@ def command(
     if len(good) < len(molecules):
         return EXIT_BAD_INPUT
     return None if complete else EXIT_NOT_CONVERGED
-
-
-def _as_error(item: Any) -> Exception:
-    assert isinstance(item, Exception)
-    return item
 
 
 def _solve(
@@ -160,7 +155,7 @@ def _discrete(
     if not found.equilibria:
         warnings.append(f"discrete: {found.status.value}")
         return None, []
-    entries = [
+    entries: list[dict[str, Any]] = [
         {
             "model": "discrete",
             "energy_RT": item.energy_RT,

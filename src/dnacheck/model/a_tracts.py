@@ -41,7 +41,7 @@ def automatic_regions(letters: str) -> tuple[Region, ...]:
 
 
 def tract_regions(letters: str) -> tuple[Region, ...]:
-    """The steps strictly inside each run of at least five equal A or T (five steps in a run of six)."""
+    """Steps inside each run of at least five equal A or T: five steps in a run of six."""
     pattern = re.compile(f"A{{{SHORTEST_RUN - 1},}}|T{{{SHORTEST_RUN - 1},}}")
     return tuple((m.start(), m.end() - 2) for m in pattern.finditer(letters))
 

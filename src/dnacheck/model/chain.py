@@ -67,7 +67,10 @@ class Chain:
             raise InputError("a chain needs ground angles (N, 3) and stiffnesses (N, 3, 3)")
         if not (np.all(np.isfinite(ground)) and np.all(np.isfinite(stiffness))):
             raise InputError("ground angles and stiffnesses must be finite")
-        for value, name in ((self.persistence_length_A, "persistence length"), (self.rise_A, "rise")):
+        for value, name in (
+            (self.persistence_length_A, "persistence length"),
+            (self.rise_A, "rise"),
+        ):
             if not (np.isfinite(value) and value > 0.0):
                 raise InputError(f"{name} must be a positive number of Å, not {value}")
         if self.step_form not in ("wedge", "midstep"):
@@ -129,9 +132,7 @@ def uniform_stiffness(n_steps: int, twist_ratio: float) -> Array:
     return np.tile(np.diag([float(twist_ratio), 1.0, 1.0]), (n_steps, 1, 1))
 
 
-def _regions(
-    molecule: Molecule, choice: str | tuple[Region, ...]
-) -> tuple[Region, ...]:
+def _regions(molecule: Molecule, choice: str | tuple[Region, ...]) -> tuple[Region, ...]:
     letters = molecule.sequence.letters
     if not isinstance(choice, str):
         return parse_regions(",".join(f"{a}..{b}" for a, b in choice), len(letters))
@@ -200,7 +201,7 @@ def build_chain(
         ratio = None
         scale = rise_A / persistence_length_A if table.stiffness_in_RT else 1.0
         stiffness = scale * table.stiffness[steps]
-    warnings = ()
+    warnings: tuple[str, ...] = ()
     if not table.strand_symmetric:
         warnings = (
             f"angle set '{table.name}' departs from the strand relation by "
