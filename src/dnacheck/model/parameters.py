@@ -160,7 +160,7 @@ class _Reader:
             )
         unit = self.text_value("stiffness_unit", "reduced")
         if unit not in ("reduced", "RT/rad^2"):
-            raise self.fail("'stiffness_unit' must be \"reduced\" or \"RT/rad^2\"", "stiffness_unit")
+            raise self.fail('\'stiffness_unit\' must be "reduced" or "RT/rad^2"', "stiffness_unit")
         ground.setflags(write=False)
         if stiffness is not None:
             stiffness.setflags(write=False)
@@ -205,7 +205,7 @@ class _Reader:
             raise self.fail(f"missing step {', '.join(missing)}; all 16 are needed")
         unit = self.text_value("unit", "degree")
         if unit not in ("degree", "radian"):
-            raise self.fail("'unit' must be \"degree\" or \"radian\"", "unit")
+            raise self.fail('\'unit\' must be "degree" or "radian"', "unit")
         factor = math.pi / 180.0 if unit == "degree" else 1.0
         ground = np.empty((16, 3))
         matrices: list[Array] = []

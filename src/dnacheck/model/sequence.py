@@ -65,8 +65,7 @@ def parse_sequence(text: str, name: str) -> Sequence:
         for position, letter in enumerate(letters, start=1):
             if letter not in BASES:
                 raise InputError(
-                    f"sequence '{name}', position {position}: "
-                    f"'{letter}' is not one of A, C, G, T"
+                    f"sequence '{name}', position {position}: '{letter}' is not one of A, C, G, T"
                 )
     if len(letters) < MINIMUM_LENGTH:
         raise InputError(
