@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dnacheck.jfactor.draw_kernels import COUNTED, NO_CROSSING, draw_pairs
-from dnacheck.jfactor.register import HeldRing, RegisterProfile, register_profile
+from dnacheck.jfactor.held_ring import HeldRing
+from dnacheck.jfactor.register import RegisterProfile, register_profile
 from dnacheck.jfactor.result import JFactor, JStatus, link_shares
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import InputError, SolveError

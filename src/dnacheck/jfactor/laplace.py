@@ -15,7 +15,9 @@ import math
 import time
 
 import numpy as np
+from numpy.typing import NDArray
 
+from dnacheck.jfactor.register_kernels import register_functionals, register_of
 from dnacheck.jfactor.result import (
     PER_CUBIC_ANGSTROM_IN_MOLAR,
     JFactor,
@@ -26,16 +28,22 @@ from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import SolveError
 from dnacheck.ring.discrete import DiscreteRing
 from dnacheck.ring.search import RingSearch, SearchOptions, find_rings
+from dnacheck.ring.spectrum import ProjectedInverse
 
-SOFT_EIGENVALUE_RT = 8.0
-"""Smallest eigenvalue of the projected Hessian (RT per square radian) below which Laplace's
-value is called unreliable: sampling from it degrades below 5 (NUMERICS 5)."""
+Array = NDArray[np.float64]
+
+SOFT_REGISTER = 0.75
+"""Standard deviation of the register (radians) above which Laplace's value is called unreliable:
+beyond it the Gaussian differs from the integral over the register by 0.1 to 0.5 in ln J."""
 
 
 def log_prefactor(chain: Chain) -> float:
     """ln of 8 pi^2 sqrt(det K) (s / 2 pi)^3 / l^3 in mol/L, K reduced; see the module's text."""
     scale = chain.energy_scale_RT / (2.0 * math.pi)
-    log_det_stiffness = float(np.linalg.slogdet(chain.stiffness)[1].sum())
+    if chain.twist_ratio is not None:
+        log_det_stiffness = chain.n_steps * math.log(chain.twist_ratio)
+    else:
+        log_det_stiffness = float(np.linalg.slogdet(chain.stiffness)[1].sum())
     return (
         math.log(8.0 * math.pi**2)
         + 0.5 * log_det_stiffness
@@ -48,6 +56,21 @@ def log_prefactor(chain: Chain) -> float:
 def laplace_log_j(ring: DiscreteRing) -> float:
     """ln J (mol/L) that Laplace's approximation gives one minimum."""
     return log_prefactor(ring.chain) - ring.energy_RT - 0.5 * ring.log_abs_det_kkt
+
+
+def register_spread(chain: Chain, link: int, angles: Array, multipliers: Array) -> float:
+    """Standard deviation of the register of a ring in Laplace's Gaussian, in radians.
+
+    ``multipliers`` (6,) are reduced. Infinite for a zero mode, such as a straight molecule has.
+    """
+    n = chain.n_steps
+    along, across = np.empty((n, 3)), np.empty((n, 3))
+    register_functionals(chain.ground, chain.form_code, link, along, across)
+    register, extent = register_of(angles, along, across)
+    row = (math.cos(register) * across - math.sin(register) * along) / extent
+    inverse = ProjectedInverse(chain, angles, multipliers)
+    variance = float(np.sum(row * inverse(row))) / chain.energy_scale_RT
+    return math.sqrt(variance) if 0.0 < variance < math.inf else math.inf
 
 
 def require_rings(search: RingSearch) -> RingSearch:
@@ -99,13 +122,14 @@ def laplace(target: Chain | RingSearch, options: SearchOptions | None = None) ->
         value = laplace_log_j(ring)
         parts[ring.link] = float(np.logaddexp(parts.get(ring.link, -math.inf), value))
     total = float(np.logaddexp.reduce(list(parts.values())))
-    softest = minima[0].smallest_eigenvalue * chain.energy_scale_RT
-    soft = not softest > SOFT_EIGENVALUE_RT
+    lowest = minima[0]
+    spread = register_spread(chain, lowest.link, lowest.angles, lowest.multipliers)
+    soft = not spread <= SOFT_REGISTER
     warnings = list(chain.warnings)
     if soft:
         warnings.append(
-            f"the softest mode of the lowest ring has {softest:.3g} RT per square radian, below "
-            f"{SOFT_EIGENVALUE_RT:g}: {JStatus.SOFT_REGISTER.value}"
+            f"the register of the lowest ring spreads by {spread:.2g} rad, more than "
+            f"{SOFT_REGISTER:g}: {JStatus.SOFT_REGISTER.value}"
         )
     return JFactor(
         target=chain.name,

@@ -22,109 +22,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dnacheck.jfactor import register_kernels as rk
-from dnacheck.jfactor.laplace import log_prefactor
+from dnacheck.jfactor.held_ring import HeldRing, Holder, RegisterOptions
+from dnacheck.jfactor.laplace import register_spread
 from dnacheck.jfactor.result import JFactor, JStatus, link_shares
 from dnacheck.jfactor.slice_kernels import ROWS
 from dnacheck.model.chain import Chain
-from dnacheck.numerics.outcome import InputError, SolveError
+from dnacheck.numerics.outcome import SolveError
 from dnacheck.ring.search import RingSearch, SearchOptions, find_rings
 from dnacheck.ring.search_kernels import best_register
-from dnacheck.ring.spectrum import ProjectedInverse
 from dnacheck.ring.start_kernels import fill_circle
 
 Array = NDArray[np.float64]
 
 _SAME_SHAPE = 1e-4
 """Two held rings are one when no angle differs by more, in radians."""
-_SUBDIVISIONS = 5
 _ZERO_MODE_SPREAD = 4.0
 """Register spread in radians above which it is called free; the circle ends at pi."""
-
-
-@dataclass(frozen=True)
-class RegisterOptions:
-    """How the register is covered.
-
-    Attributes
-    ----------
-    spacing : float
-        Distance of neighbouring registers in standard deviations of the register in the
-        narrowest minimum; a Gaussian is integrated to exp(-2 pi^2 / spacing^2).
-    fewest, most : int
-        Bounds on the number of registers on the circle.
-    depth : float
-        Registers and links whose density lies below the largest by exp(-depth) are left out.
-    tolerance : float
-        Largest entry of the gradient of a held ring's Lagrangian, RT per radian.
-    max_iterations : int
-        Of Newton's method for one held ring.
-    rule_error : float
-        Relative error of the trapezoid rule above which the number of registers is doubled.
-    """
-
-    spacing: float = 0.9
-    fewest: int = 16
-    most: int = 512
-    depth: float = 12.0
-    tolerance: float = 1e-4
-    max_iterations: int = 30
-    rule_error: float = 1e-3
-
-    def __post_init__(self) -> None:
-        for name in ("spacing", "depth", "tolerance", "rule_error"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise InputError(f"register option {name} must be positive, not {value}")
-        if not 4 <= self.fewest <= self.most:
-            raise InputError(f"register counts need 4 <= {self.fewest} <= {self.most}")
-        if self.max_iterations < 1:
-            raise InputError(f"max_iterations must be at least 1, not {self.max_iterations}")
-
-
-@dataclass(frozen=True)
-class HeldRing:
-    """The lowest closed shape of one register and the Gaussian of its neighbours.
-
-    Energies in RT, lengths in steps. ``rows``, ``projector`` and ``fibre`` are flat, (7, 3N),
-    (7, 3N) and (6, 3N); ``right``, ``z`` and ``root`` are the factors of
-    :func:`dnacheck.jfactor.slice_kernels.factorise_slice`.
-
-    Attributes
-    ----------
-    position : int
-        Number of the register on the circle's grid.
-    register : float
-        In radians.
-    angles : ndarray, shape (N, 3)
-    multipliers : ndarray, shape (7,)
-        Force, moment and register multiplier.
-    energy : float
-    slope : float
-        Derivative of the energy with respect to the register.
-    extent : float
-        |S|.
-    log_density : float
-        ln of J(psi), mol/L per radian, by Laplace's approximation.
-    direction : ndarray, shape (N, 3)
-        Row whose product with the angles is |S| on this slice.
-    """
-
-    position: int
-    register: float
-    angles: Array
-    multipliers: Array
-    energy: float
-    slope: float
-    extent: float
-    log_density: float
-    direction: Array
-    rows: Array
-    right: Array
-    z: Array
-    root: Array
-    projector: Array
-    schur: Array
-    fibre: Array
 
 
 @dataclass(frozen=True)
@@ -202,116 +115,6 @@ def _log_sum(values: list[float]) -> float:
     return float(np.logaddexp.reduce(values)) if values else -math.inf
 
 
-class _Holder:
-    """Holds rings of one molecule and link; keeps what every call needs."""
-
-    def __init__(self, chain: Chain, link: int, options: RegisterOptions) -> None:
-        self.chain, self.link, self.options = chain, link, options
-        self.stiffness = np.ascontiguousarray(chain.energy_scale_RT * chain.stiffness)
-        self.flexibility = np.ascontiguousarray(np.linalg.inv(self.stiffness))
-        n = chain.n_steps
-        self.along, self.across = np.empty((n, 3)), np.empty((n, 3))
-        rk.register_functionals(chain.ground, chain.form_code, link, self.along, self.across)
-        scale = chain.energy_scale_RT
-        self.constant = (
-            log_prefactor(chain)
-            - 3.0 * math.log(scale / (2.0 * math.pi))
-            + 1.5 * n * math.log(scale)
-            - 3.5 * math.log(2.0 * math.pi)
-        )
-
-    def hold(
-        self, position: float, registers: int, angles: Array, multipliers: Array
-    ) -> HeldRing | None:
-        """Ring at ``position`` on a circle of so many registers, from a start close by."""
-        n = self.chain.n_steps
-        register = 2.0 * math.pi * position / registers
-        angles, multipliers = angles.copy(), multipliers.copy()
-        rows, projector = np.empty((ROWS, 3 * n)), np.empty((ROWS, 3 * n))
-        right, z, root = np.empty((n, 3, ROWS)), np.empty((n, 3, ROWS)), np.empty((n, 6))
-        schur, fibre = np.empty((ROWS, ROWS)), np.empty((6, 3 * n))
-        figures = np.zeros(rk.N_FIGURES)
-        code = rk.hold(
-            angles,
-            multipliers,
-            self.stiffness,
-            self.flexibility,
-            self.chain.ground,
-            self.chain.form_code,
-            self.along,
-            self.across,
-            register,
-            self.options.tolerance,
-            self.options.max_iterations,
-            rows,
-            right,
-            z,
-            root,
-            projector,
-            schur,
-            fibre,
-            figures,
-        )
-        extent = float(figures[rk.EXTENT])
-        if code != rk.HELD or not extent > 0.0:
-            return None
-        return HeldRing(
-            position=int(round(position)) % registers,
-            register=register,
-            angles=angles,
-            multipliers=multipliers,
-            energy=float(figures[rk.ENERGY]),
-            slope=float(figures[rk.SLOPE]),
-            extent=extent,
-            log_density=self.constant
-            - float(figures[rk.ENERGY])
-            - 0.5 * float(figures[rk.LOG_DET_KKT])
-            + math.log(extent),
-            direction=math.cos(register) * self.along + math.sin(register) * self.across,
-            rows=rows,
-            right=right,
-            z=z,
-            root=root,
-            projector=projector,
-            schur=schur,
-            fibre=fibre,
-        )
-
-    def advance(
-        self, ring: HeldRing, before: HeldRing | None, step: int, registers: int
-    ) -> HeldRing | None:
-        """The next ring of a branch, extrapolated from the last two and by ever smaller steps."""
-        here, last = ring, before
-        reached, gap, pieces = 0.0, 1.0, 1
-        for _ in range(2**_SUBDIVISIONS):
-            target = min(1.0, reached + 1.0 / pieces)
-            angles, multipliers = here.angles, here.multipliers
-            if last is not None:
-                ahead = (target - reached) / gap
-                angles = angles + ahead * (here.angles - last.angles)
-                multipliers = multipliers + ahead * (here.multipliers - last.multipliers)
-            found = self.hold(ring.position + step * target, registers, angles, multipliers)
-            if found is None or np.abs(found.angles - here.angles).max() > 0.5:
-                pieces *= 2
-                if pieces > 2**_SUBDIVISIONS:
-                    return None
-                continue
-            if target >= 1.0:
-                return found
-            here, last, gap, reached = found, here, target - reached, target
-        return None
-
-
-def _register_spread(holder: _Holder, angles: Array, multipliers: Array) -> float:
-    """Standard deviation of the register at a minimum, radians; infinite for a zero mode."""
-    register, extent = rk.register_of(angles, holder.along, holder.across)
-    row = (math.cos(register) * holder.across - math.sin(register) * holder.along) / extent
-    scale = holder.chain.energy_scale_RT
-    inverse = ProjectedInverse(holder.chain, angles, multipliers)
-    variance = float(np.sum(row * inverse(row))) / scale
-    return math.sqrt(variance) if 0.0 < variance < math.inf else math.inf
-
-
 def _seeds(search: RingSearch) -> dict[int, list[tuple[Array, Array]]]:
     """Angles and multipliers (RT) to start from, by link, lowest first.
 
@@ -333,7 +136,7 @@ def _seeds(search: RingSearch) -> dict[int, list[tuple[Array, Array]]]:
     return seeds
 
 
-def _height(holder: _Holder, seeds: list[tuple[Array, Array]]) -> float:
+def _height(holder: Holder, seeds: list[tuple[Array, Array]]) -> float:
     """ln J of a link, had all registers the density of the seeds' own: an upper estimate."""
     best = -math.inf
     for angles, multipliers in seeds:
@@ -345,7 +148,7 @@ def _height(holder: _Holder, seeds: list[tuple[Array, Array]]) -> float:
 
 
 def _walk(
-    holder: _Holder, first: HeldRing, registers: int, placed: dict[int, list[HeldRing]], top: float
+    holder: Holder, first: HeldRing, registers: int, placed: dict[int, list[HeldRing]], top: float
 ) -> tuple[float, float]:
     """Follow a branch both ways from ``first``; returns the new top and what was lost.
 
@@ -388,7 +191,7 @@ def _trapezoid_error(rings: list[HeldRing]) -> float:
     return 0.5 * (even - odd) ** 2
 
 
-def _chart(holder: _Holder, seeds: list[tuple[Array, Array]], spreads: list[float]) -> Chart | None:
+def _chart(holder: Holder, seeds: list[tuple[Array, Array]], spreads: list[float]) -> Chart | None:
     """Chart of one link from its minima."""
     options = holder.options
     spread = min(min(spreads), _ZERO_MODE_SPREAD)
@@ -442,7 +245,7 @@ def register_profile(
     search = find_rings(target, search_options) if isinstance(target, Chain) else target
     chain = search.chain
     seeds = _seeds(search)
-    holders = {link: _Holder(chain, link, options) for link in seeds}
+    holders = {link: Holder(chain, link, options) for link in seeds}
     heights = {link: _height(holders[link], seeds[link]) for link in seeds}
     best = max(heights.values(), default=-math.inf)
     charts: list[Chart] = []
@@ -457,7 +260,7 @@ def register_profile(
             continue
         holder = holders[link]
         spreads = [
-            _register_spread(holder, q, m[:6] / chain.energy_scale_RT) for q, m in seeds[link]
+            register_spread(chain, link, q, m[:6] / chain.energy_scale_RT) for q, m in seeds[link]
         ]
         chart = _chart(holder, seeds[link], spreads)
         if chart is None:

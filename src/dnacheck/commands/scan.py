@@ -1,0 +1,57 @@
+"""``dnacheck scan``: ring energy and J factor of many sequences."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from dnacheck.commands.common import (
+    ModelSettings,
+    RunSettings,
+    common_options,
+    model_options,
+)
+from dnacheck.commands.output import note, print_json, progress
+
+
+@click.command(epilog="Example:  dnacheck scan library.fasta -o library.csv")
+@click.argument("fasta", type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path, dir_okay=False),
+    required=True,
+    help="CSV file; an unfinished one is gone on with.",
+)
+@click.option("--restart", is_flag=True, help="Replace an existing output file.")
+@model_options
+@common_options
+def command(
+    fasta: Path, output: Path, restart: bool, model: ModelSettings, run: RunSettings
+) -> int | None:
+    """Lowest ring and Laplace J factor of every record of FASTA.
+
+    A killed scan goes on where it stopped when the same command is given again, and ends with the
+    same file. A bad record is a row with its reason in the column "status".
+    """
+    from dnacheck.jfactor.scan import ScanOptions, fingerprint, scan, state_path, summary_line
+
+    _, records = fingerprint(fasta)
+    options = ScanOptions(model.chain_arguments(), run.threads)
+    with progress("sequences", records, run.quiet or run.json) as advance:
+        summary = scan(fasta, output, options, advance, restart)
+    if run.json:
+        print_json(
+            {
+                "output": str(output),
+                "state": str(state_path(output)),
+                "rows": summary.rows,
+                "resumed_rows": summary.resumed_rows,
+                "failed_rows": summary.failed_rows,
+                "seconds": summary.seconds,
+            }
+        )
+    else:
+        note(summary_line(summary, output), run.quiet)
+    return None
