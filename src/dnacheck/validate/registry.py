@@ -6,7 +6,7 @@ import enum
 import fnmatch
 import importlib
 import importlib.util
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dnacheck.validate.context import Context
     from dnacheck.validate.scene import Scene
 
-GROUP_MODULES = ("table2", "wanted", "continuum", "sweeps")
+GROUP_MODULES = ("table2", "wanted", "discrete", "continuum", "sweeps", "jfactors", "hard")
 """Modules of ``dnacheck.validate.checks``, in the order of the report. Each defines ``GROUP``."""
 
 
@@ -87,12 +87,17 @@ class Check:
 
 @dataclass(frozen=True)
 class Group:
-    """A chapter of the report and its checks."""
+    """A chapter of the report and its checks.
+
+    ``assemble`` may make the chapter's blocks from the findings of its checks, by name; by default
+    they follow one another.
+    """
 
     name: str
     title: str
     intro: str
     checks: tuple[Check, ...]
+    assemble: Callable[[Mapping[str, Findings]], Sequence[Block]] | None = None
 
 
 def _exists(module: str) -> bool:

@@ -18,7 +18,7 @@ from dnacheck.validate.worker import Job, serve
 
 PATIENCE = 40.0
 """A check is given so many times its usual cost, and at least PATIENCE_FLOOR seconds."""
-PATIENCE_FLOOR = 300.0
+PATIENCE_FLOOR = 1200.0
 
 Progress = Callable[[Check, Findings, bool], None]
 

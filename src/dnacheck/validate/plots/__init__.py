@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from dnacheck.validate.plots import continuation, rod, shapes
+from dnacheck.validate.plots import continuation, curves, rod, shapes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,6 +33,9 @@ KINDS: dict[str, tuple[Panel, ...]] = {
     "diagram": (continuation.diagram, continuation.diagram_by_twist),
     "ribbons": (continuation.ring_ribbon, continuation.ring_natural_ribbon),
     "robustness": (continuation.robustness, partial(continuation.robustness, which="by_width")),
+    "drift": (curves.drift,),
+    "work_precision": (curves.work_precision,),
+    "named_lines": (curves.named_lines,),
     "sweep_energy": (_sweep("energy"),),
     "sweep_parts": (_sweep("bend"), _sweep("twist")),
 }

@@ -63,7 +63,11 @@ class RunRecord:
         for group in groups():
             names = [check.name for check in group.checks if check.name in self.findings]
             if names:
-                blocks = [block for name in names for block in self.findings[name].blocks]
+                found = {name: self.findings[name] for name in names}
+                if group.assemble is not None:
+                    blocks = list(group.assemble(found))
+                else:
+                    blocks = [block for item in found.values() for block in item.blocks]
                 made.append(Section(group.name, group.title, group.intro, blocks))
         return made
 
