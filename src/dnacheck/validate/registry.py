@@ -19,7 +19,16 @@ if TYPE_CHECKING:
     from dnacheck.validate.context import Context
     from dnacheck.validate.scene import Scene
 
-GROUP_MODULES = ("table2", "wanted", "discrete", "continuum", "sweeps", "jfactors", "hard")
+GROUP_MODULES = (
+    "table2",
+    "wanted",
+    "discrete",
+    "continuum",
+    "sweeps",
+    "jfactors",
+    "bead_chain",
+    "hard",
+)
 """Modules of ``dnacheck.validate.checks``, in the order of the report. Each defines ``GROUP``."""
 
 

@@ -26,7 +26,7 @@ def _random(rng: np.random.Generator, n: int) -> Sequence:
 
 def _brute(chain: Chain, registers: int = 8) -> RingSearch:
     middle = round(chain.relaxed_turns)
-    rolls = np.arange(registers) * (2.0 * np.pi / registers)
+    rolls = np.linspace(0.0, 2.0 * np.pi, registers, endpoint=False, dtype=np.float64)
     links = tuple(range(middle - 2, middle + 3))
     return search_minima(chain, links, rolls, math.inf, NewtonOptions())
 

@@ -180,7 +180,7 @@ def convergence(context: Context) -> Findings:
         iterations.append(found.lowest.iterations)
     lower = []
     brute = _BRUTE[context.level]
-    registers = np.arange(32) * (2.0 * np.pi / 32)
+    registers = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False, dtype=np.float64)
     for number in range(brute):
         chain = random_chain(rng, 60, 400, ANGLE_SETS[number % 3])
         quick = find_rings(chain).lowest

@@ -186,8 +186,8 @@ def table3(context: Context) -> Findings:
     ]
     other = Note(
         "table3-note",
-        "The paper's fitted shift for Trifonov II, 5.2 R, does not follow from its own tables: Table "
-        f"II's energies and Table III's experimental values give {own_shift:.2f} R, as ours do. "
+        "The paper's fitted shift for Trifonov II, 5.2 R, does not follow from its own tables: "
+        f"Table II's energies and Table III's experiment give {own_shift:.2f} R, as ours do. "
         "The Trifonov and De Santis columns are shown as they come out. They differ from the "
         f"paper's by {by_set['trifonov'].rms_difference:.2f} and "
         f"{by_set['desantis'].rms_difference:.2f} RT rms, with larger fitted shifts; the other "
