@@ -141,7 +141,7 @@ def prepared_directory(directory: Path | str | None, resume: bool) -> Path | Non
 
 def _read(path: Path) -> tuple[str, str, Samples, dict[str, Any]]:
     try:
-        with np.load(path, allow_pickle=False) as data:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as data:
             samples = Samples(data["positions"], data["potential_RT"], data["kinetic_RT"])
             state = {key[6:]: data[key] for key in data.files if key.startswith("state_")}
             return str(data["platform"]), str(data["fingerprint"]), samples, state

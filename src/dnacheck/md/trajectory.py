@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +23,9 @@ Array = NDArray[np.float64]
 
 CENTRE_NAME, GROOVE_NAME = "CEN", "GRV"
 TRAJECTORY_SUFFIXES = (".dcd", ".xtc")
-# XTC stores whole multiples of 10^-decimals nm in 32 bits; its usual three decimals would give
-# angles to 0.005 rad.
-_XTC_MOST_DECIMALS = 7
-_XTC_LARGEST = 2.0e9
+# Decimals of a nanometre in XTC files, as many as the format can hold, found by reading back; its
+# usual three would give angles to 0.005 rad.
+_XTC_DECIMALS = (6, 5, 4, 3)
 _SELF_CONTAINED = (".pdb", ".gro", ".ent")
 
 
@@ -111,8 +110,8 @@ def write_trajectory(
 
     Each is moved so that the ring is centred on the origin and lies on ``reference`` (n_beads, 3)
     as well as it can, which changes no angle and leaves single precision its last digits: DCD
-    positions of a ring of 150 base pairs are good to 4e-6 Å and angles to about 4e-6 rad, and XTC
-    is written with the decimals that make it as good.
+    positions of a ring of 150 base pairs are good to 4e-6 Å and angles to about 4e-6 rad; XTC is
+    written with as many decimals as it holds, 1e-5 Å and 2e-5 rad at this size.
 
     Raises
     ------
@@ -124,23 +123,42 @@ def write_trajectory(
     path = Path(path)
     if path.suffix.lower() not in TRAJECTORY_SUFFIXES:
         raise InputError(f"trajectory '{path}' must be a .dcd or .xtc file")
-    import MDAnalysis as mda
-
     reference = positions[0] if reference is None else reference
     moved = superposed(positions, reference - reference.mean(axis=0))
     universe = bead_universe(chain, closed)
-    settings: dict[str, object] = {"n_atoms": len(universe.atoms)}
-    if path.suffix.lower() == ".dcd":
-        settings["dt"] = interval_ps
-    else:
-        largest = max(0.1, float(np.max(np.abs(moved))) / 10.0)
-        settings["precision"] = min(_XTC_MOST_DECIMALS, int(np.log10(_XTC_LARGEST / largest)))
-    with _replacing(path) as scratch, mda.Writer(str(scratch), **settings) as writer:
-        for i, frame in enumerate(moved):
+    with _replacing(path) as scratch:
+        if path.suffix.lower() == ".dcd":
+            _write_frames(scratch, universe, moved, interval_ps, {"dt": interval_ps})
+            return
+        for decimals in _XTC_DECIMALS:
+            _write_frames(scratch, universe, moved, interval_ps, {"precision": decimals})
+            if _xtc_error(scratch, moved) < 2.0 * 10.0 ** (1 - decimals):
+                return
+        raise InputError(f"the chain is too large for the XTC format; write '{path}' as .dcd")
+
+
+def _write_frames(
+    path: Path, universe: mda.Universe, frames: Array, interval_ps: float, settings: dict[str, Any]
+) -> None:
+    import MDAnalysis as mda
+
+    with mda.Writer(str(path), n_atoms=len(universe.atoms), **settings) as writer:
+        for i, frame in enumerate(frames):
             universe.atoms.positions = frame
             universe.trajectory.ts.frame = i
             universe.trajectory.ts.time = i * interval_ps
             writer.write(universe.atoms)
+
+
+def _xtc_error(path: Path, frames: Array) -> float:
+    """Largest error, in Å, of what an XTC file gives back."""
+    from MDAnalysis.lib.formats.libmdaxdr import XTCFile
+
+    with XTCFile(str(path)) as stream:
+        return max(
+            float(np.max(np.abs(10.0 * got.x - frame)))
+            for got, frame in zip(stream, frames, strict=True)
+        )
 
 
 def open_trajectory(trajectory: str | Path, topology: str | Path | None = None) -> mda.Universe:
@@ -159,6 +177,7 @@ def open_trajectory(trajectory: str | Path, topology: str | Path | None = None) 
         A file is missing or unreadable, the topology is missing, or the two do not fit.
     """
     import MDAnalysis as mda
+    from MDAnalysis.lib.formats.libdcd import DCDFile
 
     for path in (trajectory, topology):
         if path is not None and not Path(path).is_file():
@@ -173,6 +192,10 @@ def open_trajectory(trajectory: str | Path, topology: str | Path | None = None) 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
+            if Path(trajectory).suffix.lower() == ".dcd":
+                # A reader that fails to open would complain again when it is deleted.
+                with DCDFile(str(trajectory)):
+                    pass
             return mda.Universe(*names, **settings)
         except Exception as error:  # readers of many formats raise what they like
             first = str(error).strip().splitlines()[0] if str(error).strip() else repr(error)
@@ -182,6 +205,8 @@ def open_trajectory(trajectory: str | Path, topology: str | Path | None = None) 
 @contextmanager
 def _replacing(path: Path) -> Iterator[Path]:
     """A new file beside ``path`` that takes its place when it is complete."""
+    if not path.parent.is_dir():
+        raise InputError(f"cannot write '{path}': there is no directory '{path.parent}'")
     scratch = path.with_name(f".{secrets.token_hex(8)}{path.suffix.lower()}")
     try:
         with warnings.catch_warnings():
