@@ -2,7 +2,7 @@
 
 What counts as an example:
 
-* a fence ``pycon``: a Python session; all sessions of a page share their names;
+* a fence ``pycon``: Python prompts with their output; all of a page share their names;
 * a fence ``console``: every line ``$ dnacheck ...`` is run, in a folder of the page's own, and the
   lines below it, up to the next ``$``, are its output; other commands are left alone;
 * a ``{code-block}`` with a ``:caption:``: a file of that name in the page's folder.
@@ -97,7 +97,7 @@ def run_page(page: Path, folder: Path, slow: bool = False) -> list[Difference]:
             elif fence.slow and not slow:
                 continue
             elif fence.info == "pycon":
-                differences += _run_session(fence, names, page.name)
+                differences += _run_prompts(fence, names, page.name)
             elif fence.info == "console":
                 differences += _run_commands(fence, page.name)
     return differences
@@ -110,7 +110,7 @@ def _write_file(fence: Fence) -> None:
         Path(caption[1]).write_text(body, encoding="utf-8")
 
 
-def _run_session(fence: Fence, names: dict[str, object], page: str) -> list[Difference]:
+def _run_prompts(fence: Fence, names: dict[str, object], page: str) -> list[Difference]:
     differences: list[Difference] = []
 
     class Runner(doctest.DocTestRunner):
