@@ -31,7 +31,7 @@ class RegisterOptions:
         Distance of neighbouring registers in standard deviations of the register in the
         narrowest minimum; a Gaussian is integrated to exp(-2 pi^2 / spacing^2).
     fewest, most : int
-        Bounds on the number of registers on the circle.
+        Bounds on the number of registers on the circle; only those within ``depth`` are visited.
     depth : float
         Registers and links whose density lies below the largest by exp(-depth) are left out.
     tolerance : float
@@ -44,7 +44,7 @@ class RegisterOptions:
 
     spacing: float = 0.9
     fewest: int = 16
-    most: int = 512
+    most: int = 65_536
     depth: float = 12.0
     tolerance: float = 1e-4
     max_iterations: int = 30

@@ -74,14 +74,14 @@ def register_spread(chain: Chain, link: int, angles: Array, multipliers: Array) 
 
 
 def require_rings(search: RingSearch) -> RingSearch:
-    """The search itself, if it found a stable ring.
+    """The search itself, if it found a ring that is not unstable.
 
     Raises
     ------
     SolveError
         No stable ring at any link searched.
     """
-    if not any(ring.stable for ring in search.equilibria):
+    if all(ring.stable is False for ring in search.equilibria):
         raise SolveError(
             f"J factor of {search.chain.name}: no stable ring at links "
             f"{', '.join(map(str, search.links_searched))}; {JStatus.NOT_FOUND.value}",
@@ -110,13 +110,21 @@ def laplace(target: Chain | RingSearch, options: SearchOptions | None = None) ->
     Raises
     ------
     SolveError
-        No stable ring at any link searched.
+        No stable ring at any link searched, or the lowest is one of a family of equal energy (a
+        straight molecule, whose register is free), for which Laplace's integral diverges.
     """
     began = time.perf_counter()
     search = find_rings(target, options) if isinstance(target, Chain) else target
     require_rings(search)
     chain = search.chain
     minima = [ring for ring in search.equilibria if ring.stable]
+    neutral = [ring.link for ring in search.equilibria if ring.stable is None]
+    if neutral:
+        raise SolveError(
+            f"J factor of {chain.name}: the register is free at link {neutral[0]}, where Laplace's "
+            "approximation diverges; use the register-integrated one or sample",
+            search,
+        )
     parts: dict[int, float] = {}
     for ring in minima:
         value = laplace_log_j(ring)

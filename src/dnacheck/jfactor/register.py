@@ -52,8 +52,7 @@ class Chart:
     rings : tuple of HeldRing
         By position; two rings at one position are different minima (branches) there.
     rule_error : float
-        Estimated relative error of the trapezoid rule: the square of half the relative difference
-        between its values on the even and the odd points.
+        Estimated relative error of the trapezoid rule, see :func:`_trapezoid_error`.
     lost : float
         Estimated relative weight of registers where no minimum could be followed.
     """
@@ -176,19 +175,20 @@ def _walk(
     return top, lost
 
 
-def _trapezoid_error(rings: list[HeldRing]) -> float:
-    """Estimated relative error of the trapezoid rule over these rings.
+def _trapezoid_error(rings: list[HeldRing], registers: int) -> float:
+    """Estimated relative error of the trapezoid rule of so many registers.
 
-    For an analytic periodic integrand the Fourier coefficients fall at least geometrically, so
-    halving the spacing squares the relative error; that of the doubled spacing is seen in the
-    difference of the even and the odd points.
+    The rule errs by twice the Fourier coefficient of order ``registers`` of the density, over its
+    mean. An analytic periodic function's coefficients fall at least geometrically, so that one is
+    extrapolated from the highest order whose size the same points show whatever its phase.
     """
-    total = _log_sum([ring.log_density for ring in rings])
-    even, odd = (
-        math.exp(_log_sum([r.log_density for r in rings if r.position % 2 == parity]) - total)
-        for parity in (0, 1)
-    )
-    return 0.5 * (even - odd) ** 2
+    top = max(ring.log_density for ring in rings)
+    weights = np.exp([ring.log_density - top for ring in rings])
+    positions = np.array([ring.position for ring in rings])
+    order = registers // 2 - 1
+    wave = np.exp(2j * math.pi * order * positions / registers)
+    fraction = min(1.0, abs(weights @ wave) / float(weights.sum()))
+    return float(2.0 * fraction ** (registers / order))
 
 
 def _chart(holder: Holder, seeds: list[tuple[Array, Array]], spreads: list[float]) -> Chart | None:
@@ -215,7 +215,7 @@ def _chart(holder: Holder, seeds: list[tuple[Array, Array]], spreads: list[float
         rings = [ring for ring in rings if ring.log_density > top - options.depth]
         if not rings:
             return None
-        error = _trapezoid_error(rings)
+        error = _trapezoid_error(rings, registers)
         if error <= options.rule_error or 2 * registers > options.most:
             break
         registers *= 2
