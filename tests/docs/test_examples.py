@@ -29,7 +29,7 @@ def test_examples_print_what_the_page_shows(page, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", [page for page in PAGES if has_slow(page)], ids=str)
+@pytest.mark.parametrize("page", [page for page in PAGES if has_slow(page)], ids=lambda p: p.name)
 def test_slow_examples_print_what_the_page_shows(page, tmp_path):
     differences = run_page(page, tmp_path, slow=True)
     assert not differences, "\n\n".join(map(str, differences))
