@@ -13,7 +13,7 @@ number of the Gaussian's standard deviations apart, make a mixture without it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ from dnacheck.ring.closure_kernels import (
     energy_gradient,
     linearise,
 )
-from dnacheck.ring.search import RingSearch, find_rings
+from dnacheck.ring.search import RingSearch
 from dnacheck.ring.spectrum import ProjectedInverse
 from dnacheck.ring.sweep_kernels import FACTOR_WIDTH, factorise
 
@@ -40,8 +40,6 @@ _SOFT_RATIO = 0.5
 the weights' square times the Gaussian has the inverse covariance 2H - K."""
 _WINDOW_RT = 8.0
 """Minima this far above the lowest add less than a part in a thousand to J."""
-_SLIGHT_BEND = 2e-3
-"""Ground bend in radians per step that makes a free register prefer one side."""
 _REACH_RT = 6.0
 _MOST_PER_SIDE = 24
 _CURVATURE_LIMIT = 6.0
@@ -221,21 +219,11 @@ def _walk(chain: Chain, start: Array, direction: Array, ceiling: float, known: l
         q, way = moved, new if along > 0.0 else -new
 
 
-def _with_preferred_side(chain: Chain) -> Chain:
-    """The chain with a slight ground curvature, the same all along its relaxed axis."""
-    phase = np.cumsum(chain.ground[:, 0])
-    ground = chain.ground.copy()
-    ground[:, 1] += _SLIGHT_BEND * np.cos(phase)
-    ground[:, 2] += _SLIGHT_BEND * np.sin(phase)
-    return replace(chain, ground=ground)
-
-
 def centre_shapes(search: RingSearch) -> list[tuple[Array, Array, int]]:
     """Angles (N, 3), reduced multipliers (6,) and link of the shapes that sampling starts from.
 
-    They are the minima of the search. A free register leaves Newton's method without an isolated
-    solution, so where a start failed the minima of the slightly curved chain are added; a tilt
-    need not be an equilibrium.
+    They are the minima of the search, and the one ring of a family with a free register that it
+    found; a tilt need not be an isolated minimum.
 
     Raises
     ------
@@ -243,14 +231,7 @@ def centre_shapes(search: RingSearch) -> list[tuple[Array, Array, int]]:
         There is none.
     """
     chain = search.chain
-    shapes = [(r.angles, r.multipliers, r.link) for r in search.equilibria if r.stable]
-    if search.failed_starts:
-        for ring in find_rings(_with_preferred_side(chain)).equilibria:
-            if all(
-                ring.link != link or _distance(chain, ring.angles, known) > 0.75 * _SPACING
-                for known, _, link in shapes
-            ):
-                shapes.append((ring.angles, ring.multipliers, ring.link))
+    shapes = [(r.angles, r.multipliers, r.link) for r in search.equilibria if r.stable is not False]
     if not shapes:
         raise SolveError(
             f"J factor of {chain.name}: no stable ring at links "
