@@ -48,7 +48,7 @@ BROKEN = {
     "no molecules": (changed('[molecules]\nembedded = ["11T15"]', ""), "'molecules' is missing"),
     "no molecule": (changed('embedded = ["11T15"]', ""), "no molecule"),
     "unknown key": (changed("twist_ratios", "twist_ratio"), "line 7.*did you mean 'twist_ratios'"),
-    "unknown table": (GOOD + "\n[modle]\nx = 1\n", "line 12.*did you mean 'model'"),
+    "unknown table": (GOOD + "\n[models]\nx = 1\n", "line 12.*did you mean 'model'"),
     "unknown quantity": (changed("energy = 0.005", "enegy = 0.005"), "line 10.*'energy'"),
     "reserved key": ('resolved = "x"\n' + GOOD, "line 1.*remove it"),
     "text for a number": (changed("0.005", '"small"'), "line 10.*number"),
