@@ -187,8 +187,8 @@ def _trapezoid_error(rings: list[HeldRing], registers: int) -> float:
     positions = np.array([ring.position for ring in rings])
     order = registers // 2 - 1
     wave = np.exp(2j * math.pi * order * positions / registers)
-    fraction = min(1.0, abs(weights @ wave) / float(weights.sum()))
-    return float(2.0 * fraction ** (registers / order))
+    fraction = min(1.0, float(np.abs(weights @ wave)) / float(weights.sum()))
+    return 2.0 * math.pow(fraction, registers / order)
 
 
 def _chart(holder: Holder, seeds: list[tuple[Array, Array]], spreads: list[float]) -> Chart | None:

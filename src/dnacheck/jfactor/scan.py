@@ -343,6 +343,7 @@ def scan(
                     future, size = pending.popleft()
                     text, bad = future.result()
                     handle.write(text)
+                    handle.flush()
                     done += size
                     failed += bad
                     if progress is not None:

@@ -1,0 +1,121 @@
+"""``dnacheck jfactor`` and ``dnacheck scan``: what they print and refuse."""
+
+import json
+import math
+
+import pytest
+
+from dnacheck import cli
+
+
+def run(capsys, *arguments):
+    code = cli.main(list(arguments))
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def test_json_has_the_promised_members(capsys):
+    code, out, _ = run(capsys, "jfactor", "08T15", "--json", "--tolerance", "0.03")
+    record = json.loads(out)
+    assert code == 0
+    promised = {"target", "n_bp", "method", "minus_lnJ", "stderr", "J_molar", "links"}
+    assert promised | {"effective_samples", "seconds", "warnings"} <= set(record)
+    assert record["method"] == "closure"
+    assert abs(record["minus_lnJ"] - 15.765) < 4 * record["stderr"]
+    assert record["J_molar"] == pytest.approx(math.exp(-record["minus_lnJ"]))
+    assert {"link", "minus_lnJ"} <= set(record["links"][0])
+    assert "laplace" in record["reason"]
+
+
+def test_auto_takes_laplace_where_its_measured_error_is_small_enough(capsys):
+    code, out, _ = run(capsys, "jfactor", "08T15", "--json", "--tolerance", "0.6")
+    record = json.loads(out)
+    assert code == 0
+    assert record["method"] == "laplace"
+    assert 0.2 < record["bias_bound"] < 0.6
+    assert abs(record["minus_lnJ"] - 15.765) < record["bias_bound"]
+
+
+def test_seed_fixes_the_result(capsys):
+    results = [
+        json.loads(run(capsys, "jfactor", "09T15", "--json", "--seed", seed)[1])["minus_lnJ"]
+        for seed in ("1", "1", "2")
+    ]
+    assert results[0] == results[1] != results[2]
+
+
+@pytest.mark.parametrize("tolerance", ["0", "-0.1", "nan", "inf", "wide"])
+def test_a_bad_tolerance_is_bad_usage(capsys, tolerance):
+    code, out, err = run(capsys, "jfactor", "08T15", "--tolerance", tolerance)
+    assert code == 2
+    assert out == ""
+    assert len(err.strip().splitlines()) == 1
+    assert "--tolerance" in err
+
+
+def test_a_tolerance_out_of_reach_gives_the_best_so_far(capsys):
+    code, out, _ = run(
+        capsys, "jfactor", "12A09", "--json", "--tolerance", "1e-5", "--max-seconds", "0.3"
+    )
+    record = json.loads(out)
+    assert code == 3
+    assert record["stderr"] > 1e-5
+    assert abs(record["minus_lnJ"] - 19.71) < 0.1
+    assert "tolerance was not met" in record["status"]
+
+
+@pytest.mark.parametrize("method", ["laplace", "register-laplace", "closure"])
+def test_methods_by_name(capsys, method):
+    code, out, _ = run(capsys, "jfactor", "15A09", "--json", "--method", method)
+    record = json.loads(out)
+    assert code == 0
+    assert record["method"] == method
+    assert 16.5 < record["minus_lnJ"] < 17.3
+
+
+def test_several_molecules(capsys, tmp_path):
+    path = tmp_path / "two.fasta"
+    path.write_text(">a\n" + "ACGTTGCATGCCGATAACGT" * 5 + "\n>b\n" + "ACGGTGCATGCTGATAACGA" * 6)
+    code, out, _ = run(capsys, "jfactor", str(path), "--json", "--tolerance", "0.05")
+    records = json.loads(out)["results"]
+    assert code == 0
+    assert [record["target"] for record in records] == ["a", "b"]
+
+
+def test_text_names_the_method_and_the_reason(capsys):
+    code, out, _ = run(capsys, "jfactor", "09T15")
+    assert code == 0
+    assert out.startswith("09T15: -ln J = 15.5")
+    assert "closure is the cheapest whose measured error" in out
+
+
+def test_bad_letters_are_one_line(capsys):
+    code, _, err = run(capsys, "jfactor", "ACGTNACGTACGT")
+    assert code == 2
+    assert "position 5" in err
+
+
+def test_scan_writes_rows_and_json(capsys, tmp_path):
+    source, output = tmp_path / "in.fasta", tmp_path / "out.csv"
+    source.write_text(">a\n" + "ACGTTGCATGCCGATAACGT" * 5 + "\n>b\nACGN\n")
+    code, out, _ = run(capsys, "scan", str(source), "-o", str(output), "--json")
+    record = json.loads(out)
+    assert code == 0
+    assert (record["rows"], record["resumed_rows"], record["failed_rows"]) == (2, 0, 1)
+    assert output.read_text().startswith(
+        "name,n_bp,link,energy_RT,energy_reduced,minus_lnJ,status\n"
+    )
+    code, _, err = run(capsys, "scan", str(source), "-o", str(output))
+    assert code == 0
+    assert "2 of them from before" in err
+
+
+def test_scan_refuses_what_it_cannot_read_or_write(capsys, tmp_path):
+    code, _, err = run(capsys, "scan", str(tmp_path / "absent"), "-o", str(tmp_path / "o.csv"))
+    assert code == 2
+    assert "check the path" in err
+    source = tmp_path / "in.fasta"
+    source.write_text(">a\n" + "ACGTTGCATGCCGATAACGT" * 5 + "\n")
+    code, _, err = run(capsys, "scan", str(source), "-o", str(tmp_path / "absent" / "o.csv"))
+    assert code == 2
+    assert "cannot write" in err
