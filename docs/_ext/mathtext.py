@@ -6,6 +6,7 @@ A display formula may have several lines, separated by ``\\\\``; each is set by 
 from __future__ import annotations
 
 import html
+import re
 from functools import cache
 from typing import Any
 
@@ -23,6 +24,50 @@ SIZE = 100.0
 MARGIN = 3.0
 """Space around a formula, so that no stroke is cut."""
 _LETTERS = {Outline.MOVETO: "M", Outline.LINETO: "L", Outline.CURVE3: "Q", Outline.CURVE4: "C"}
+
+
+_ARGUMENTS = {
+    name: count
+    for count, names in (
+        (1, "mathbf mathrm mathsf mathcal sqrt hat bar dot vec tilde"),
+        (2, "frac"),
+    )
+    for name in names.split()
+}
+_NAMES = {"le": "leq", "ge": "geq", "tfrac": "frac", "dfrac": "frac", "lvert": "vert"}
+_SIZES = re.compile(r"\\(?:big|Big|bigg|Bigg)[lr]?(?![A-Za-z])")
+_TOKEN = re.compile(r"\s*(\\[A-Za-z]+|\\.|[^\s{}\[])")
+
+
+def normalised(latex: str) -> str:
+    r"""LaTeX as mathtext reads it: ``\frac\phi2`` becomes ``\frac{\phi}{2}``; no sizes."""
+    text = _SIZES.sub("", " ".join(latex.split()))
+    text = re.sub(r"\\([A-Za-z]+)", lambda found: "\\" + _NAMES.get(found[1], found[1]), text)
+    # From the right, so that an argument that is itself a command has its own braces already.
+    for found in reversed(list(re.finditer(r"\\([A-Za-z]+)", text))):
+        end = found.end()
+        for _ in range(_ARGUMENTS.get(found[1], 0)):
+            token = _TOKEN.match(text, end)
+            if token is None:
+                end = _after_group(text, end)
+                continue
+            stop = token.end()
+            for _ in range(_ARGUMENTS.get(token[1][1:], 0)):
+                stop = _after_group(text, stop)
+            inside = "{" + text[token.start(1) : stop] + "}"
+            text = text[:end] + inside + text[stop:]
+            end += len(inside)
+    return text
+
+
+def _after_group(text: str, start: int) -> int:
+    """Position after the braced group that begins at or after ``start``."""
+    depth = 0
+    for place in range(start, len(text)):
+        depth += {"{": 1, "}": -1}.get(text[place], 0)
+        if depth == 0 and text[place] == "}":
+            return place + 1
+    return len(text)
 
 
 @cache
@@ -45,7 +90,7 @@ def _drawn(latex: str) -> tuple[float, float, float, str]:
 
 def svg(latex: str) -> str:
     """An ``<svg>`` whose baseline sits on that of the text."""
-    width, height, depth, path = _drawn(" ".join(latex.split()))
+    width, height, depth, path = _drawn(normalised(latex))
     wide, tall = width + 2.0 * MARGIN, height + depth + 2.0 * MARGIN
     return (
         f'<svg class="math" role="img" aria-label="{html.escape(latex, quote=True)}" '
