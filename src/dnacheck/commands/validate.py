@@ -60,7 +60,8 @@ def command(
     if quick and full:
         raise click.UsageError("--quick and --full exclude each other")
     if new_scene is not None:
-        return _write_scene(new_scene, run)
+        _write_scene(new_scene, run)
+        return None
     from dnacheck.validate.harness import RunOptions, run_scene
     from dnacheck.validate.plan import make_plan
     from dnacheck.validate.registry import Level, select
