@@ -14,6 +14,10 @@ class Status(enum.Enum):
         "converged to an equilibrium that is not a minimum; start from another register "
         "or ask for minima only"
     )
+    NEUTRAL = (
+        "converged to one of a family of equilibria of equal energy (a zero mode, such as the "
+        "register of a straight molecule); its energy holds for all of them"
+    )
     ITERATION_LIMIT = (
         "stopped at the iteration limit before the tolerance was met; raise max_iterations "
         "or start from another register or link"
@@ -39,7 +43,7 @@ class Status(enum.Enum):
     @property
     def ok(self) -> bool:
         """Whether the result may be used as an equilibrium."""
-        return self in (Status.CONVERGED, Status.SADDLE)
+        return self in (Status.CONVERGED, Status.SADDLE, Status.NEUTRAL)
 
 
 class DnaCheckError(Exception):

@@ -78,11 +78,13 @@ class DiscreteRing:
     twist, writhe : float
         In turns, of the polygon of base-pair centres.
     stable : bool or None
-        Whether the projected Hessian is positive; None where the search did not converge.
+        Whether the projected Hessian is positive; None where the search did not converge, or
+        where an eigenvalue is zero to round-off (``status`` tells which).
     negative_eigenvalues : int
-        Of the projected Hessian.
+        Of the projected Hessian, round-off apart.
     log_abs_det_kkt : float
-        log |det| of the matrix [[H, G^T], [G, 0]], for the Laplace J factor.
+        log |det| of the matrix [[H, G^T], [G, 0]], for the Laplace J factor; of no use where an
+        eigenvalue is zero.
     residual, closure : float
         Largest entry of all equations, and of the closure equations alone.
     iterations : int
@@ -156,9 +158,12 @@ def make_ring(
     converged = code == nk.CONVERGED
     link, twist, writhe = link_of_ring(centres, frames) if np.isfinite(centres).all() else (0, 0, 0)
     negatives = int(figures[nk.NEGATIVES])
+    neutral = converged and figures[nk.NEUTRAL] > 0.0
     status = _STATUS[code]
     if converged and negatives:
         status = Status.SADDLE
+    elif neutral:
+        status = Status.NEUTRAL
     angles.setflags(write=False)
     multipliers.setflags(write=False)
     return DiscreteRing(
@@ -169,7 +174,7 @@ def make_ring(
         link=int(link),
         twist=float(twist),
         writhe=float(writhe),
-        stable=negatives == 0 if converged else None,
+        stable=negatives == 0 if converged and (negatives or not neutral) else None,
         negative_eigenvalues=negatives,
         log_abs_det_kkt=float(figures[nk.LOG_DET_KKT]),
         residual=float(figures[nk.RESIDUAL]),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,9 +34,9 @@ class SearchOptions:
     ----------
     links : "auto", "all" or int
         ``auto``: the two links next to the ground twist and every other whose twisting energy
-        stays within 8 RT or half the bending energy of a circle. ``all``: five links or more
-        around the ground twist from eight registers each. An integer: that link alone, eight
-        registers.
+        stays within 8 RT or half the bending energy of a circle, from the registers where the
+        planar ring is predicted to rest. ``all``: five links or more around the ground twist,
+        from eight more registers each. An integer: that link alone, eight more registers.
     newton : NewtonOptions
     """
 
@@ -104,15 +104,15 @@ def candidate_links(chain: Chain) -> tuple[int, ...]:
 def find_rings(chain: Chain, options: SearchOptions | None = None) -> RingSearch:
     """Minima of the closed chain over links and registers, lowest first.
 
-    Every start is a planar ring of a given link, rolled to the register that first-order
-    perturbation in the ground curvature selects, and to the opposite one (to eight with ``all``
-    or a given link); no continuum solution is needed.
+    Every start is a planar ring of a given link, rolled to the registers that second-order
+    perturbation in the ground bends selects (and to eight more with ``all`` or a given link); no
+    continuum solution is needed.
     """
     options = options or SearchOptions()
     if options.links == "auto":
         links: tuple[int, ...] = candidate_links(chain)
-        registers = np.array([0.0, np.pi])
-        window = _WINDOW_RT / chain.energy_scale_RT
+        registers: NDArray[Any] = np.empty(0)
+        window = 0.0
     elif options.links == "all":
         nearest = round(chain.relaxed_turns)
         around = range(nearest - _ALL_LINKS_REACH, nearest + _ALL_LINKS_REACH + 1)
@@ -129,22 +129,23 @@ def find_rings(chain: Chain, options: SearchOptions | None = None) -> RingSearch
 def search_minima(
     chain: Chain,
     links: tuple[int, ...],
-    registers: NDArray[np.float64],
+    registers: NDArray[Any],
     window: float,
     options: NewtonOptions,
 ) -> RingSearch:
     """Minima reached from planar rings of the given links and registers.
 
-    ``registers`` are in radians from each link's best one; all but the first are tried only for
-    links whose minimum lies within ``window`` (reduced energy) of the lowest.
+    Each link starts from the registers where its planar ring is predicted to rest. Links whose
+    minimum lies within ``window`` (reduced energy) of the lowest start again from ``registers``,
+    in radians from the best of these.
     """
-    most = min(_MOST_MINIMA, len(links) * len(registers))
+    most = min(_MOST_MINIMA, len(links) * (2 + len(registers)))
     n = chain.n_steps
     angles = np.empty((most, n, 3))
     multipliers = np.empty((most, 6))
     figures = np.empty((most, nk.N_FIGURES))
     began = time.perf_counter()
-    found, failed, _ = search(
+    found, starts, failed = search(
         chain.ground,
         chain.stiffness,
         chain.form_code,
@@ -175,7 +176,7 @@ def search_minima(
         chain=chain,
         equilibria=rings,
         links_searched=links,
-        starts=len(links) * len(registers),
+        starts=starts,
         failed_starts=failed,
         seconds=seconds,
         status=Status.CONVERGED if rings else Status.NOT_FOUND,

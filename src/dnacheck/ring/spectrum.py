@@ -78,6 +78,8 @@ def smallest_projected_eigenvalue(chain: Chain, angles: Array, multipliers: Arra
             w -= np.sum(w * v) * v
         size = float(np.linalg.norm(w))
         values = _tridiagonal_eigenvalues(diagonal, off)
+        # Beside a zero mode, whose inverse is huge, small values are its rounding errors.
+        values = values[np.abs(values) > 1e-9 * np.abs(values).max()]
         negative = values[values < 0.0]
         chosen = negative.max() if negative.size else values.max()
         if abs(chosen - previous) <= _LANCZOS_TOLERANCE * abs(chosen) or size < 1e-300:
