@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from dnacheck.jfactor.laplace import laplace_log_j
 from dnacheck.jfactor.scan import (
     COLUMNS,
     STATUS_FOUND,
+    STATUS_FREE,
     ScanOptions,
     fasta_records,
     fingerprint,
@@ -24,6 +26,7 @@ from dnacheck.jfactor.scan import (
     state_path,
 )
 from dnacheck.model.chain import build_chain
+from dnacheck.model.parameters import load_angle_set
 from dnacheck.model.sequence import parse_sequence
 from dnacheck.numerics.outcome import InputError
 from dnacheck.ring.search import find_rings
@@ -108,6 +111,16 @@ def test_a_molecule_too_long_is_a_row():
     row = scan_row("long", "A" * 100_001, {})
     assert row[1] == "100001"
     assert "more than 100000" in row[-1]
+
+
+def test_a_free_register_has_an_energy_and_no_j(tmp_path):
+    """Straight steps of one kind make a straight molecule; its ring may be rolled freely."""
+    table = load_angle_set("trifonov2")
+    straight = replace(table, ground=np.tile([2 * math.pi / 10.45, 0.0, 0.0], (16, 1)))
+    row = scan_row("straight", "A" * 150, {"angles": straight, "a_tracts": "none"})
+    assert row[-1] == STATUS_FREE
+    assert row[5] == ""
+    assert float(row[3]) == pytest.approx(21.288959, abs=1e-4)
 
 
 def test_threads_do_not_matter(library, tmp_path):

@@ -38,6 +38,7 @@ from dnacheck.ring.search import candidate_links
 COLUMNS = ("name", "n_bp", "link", "energy_RT", "energy_reduced", "minus_lnJ", "status")
 STATUS_FOUND = "ok"
 STATUS_NO_RING = "no stable ring found at any link searched"
+STATUS_FREE = "free register, no Laplace value; use dnacheck jfactor"
 
 _BLOCK = 8
 """Records handed to a thread at a time."""
@@ -161,14 +162,15 @@ def scan_row(name: str, letters: str, arguments: Mapping[str, Any]) -> list[str]
     if not found or not np.isfinite(figures).all():
         return [*cells, STATUS_NO_RING]
     energy = float(figures[sk.LOWEST_ENERGY])
+    free = figures[sk.FREE_REGISTERS] > 0
     return [
         name,
         str(chain.n_steps),
         str(int(figures[sk.LOWEST_LINK])),
         f"{energy * scale:.6f}",
         f"{energy:.8f}",
-        f"{-figures[sk.LOG_J]:.6f}",
-        STATUS_FOUND,
+        "" if free else f"{-figures[sk.LOG_J]:.6f}",
+        STATUS_FREE if free else STATUS_FOUND,
     ]
 
 

@@ -16,14 +16,15 @@ from dnacheck.ring.newton_kernels import (
     LOG_DET_KKT,
     N_FIGURES,
     NEGATIVES,
+    NEUTRAL,
     newton,
 )
 from dnacheck.ring.start_kernels import circle_registers, fill_circle
 from dnacheck.ring.topology_kernels import link_of_ring
 
 # Positions of the figures of a scanned molecule.
-LOWEST_ENERGY, LOWEST_LINK, LOG_J, MINIMA, FAILED_STARTS = range(5)
-N_SCAN_FIGURES = 5
+LOWEST_ENERGY, LOWEST_LINK, LOG_J, MINIMA, FAILED_STARTS, FREE_REGISTERS = range(6)
+N_SCAN_FIGURES = 6
 
 _TOLERANCE = 1e-8
 _TURN_CAP = 0.5
@@ -47,8 +48,8 @@ def scan_molecule(
     ground, stiffness : (N, 3), (N, 3, 3), reduced.
     links : (L,), candidates. scale : RT per reduced unit.
     constant : ln J = constant - E - ln det KKT / 2, see :mod:`dnacheck.jfactor.laplace`.
-    figures : (5,), filled with the lowest reduced energy, its link, ln J, the number of minima
-        and of starts that failed.
+    figures : (6,), filled with the lowest reduced energy, its link, ln J, the number of minima,
+        of starts that failed, and of minima whose register is free, for which ln J means nothing.
 
     Returns
     -------
@@ -69,6 +70,7 @@ def scan_molecule(
     energies = np.full(2 * count, math.inf)
     minima = 0
     failed = 0
+    free = 0
     lowest = math.inf
     lowest_link = 0
     best = -math.inf
@@ -77,13 +79,19 @@ def scan_molecule(
         fill_circle(ground, form, links[i], rests[i, 0], trial)
         planar[i] = energy_gradient(trial, ground, stiffness, gradient)
     least = planar.min()
-    for round_ in range(2):
+    for round_ in range(5):
+        if round_ >= 2 and minima > 0:
+            break
         for i in range(count):
-            if (planar[i] - least) * scale > _PLANAR_WINDOW_RT:
+            # The last rounds, for a molecule without any minimum so far, try everything.
+            if round_ < 2 and (planar[i] - least) * scale > _PLANAR_WINDOW_RT:
                 continue
             if round_ == 1 and (choices[i] < 2 or not parts[i] > best - _WINDOW_RT):
                 continue
-            fill_circle(ground, form, links[i], rests[i, round_], trial)
+            register = (
+                rests[i, round_] if round_ < 2 else rests[i, 0] + 0.5 * math.pi * (round_ - 1)
+            )
+            fill_circle(ground, form, links[i], register, trial)
             for j in range(6):
                 force[j] = 0.0
             for j in range(N_FIGURES):
@@ -109,11 +117,12 @@ def scan_molecule(
                 known = known or gap <= _SAME_ENERGY * abs(figure[ENERGY]) + 1e-14
             if known:
                 continue
-            slot = i + count * round_
+            slot = i + count * (1 if round_ == 1 else 0)
             energies[slot] = figure[ENERGY]
             parts[slot] = constant - scale * figure[ENERGY] - 0.5 * figure[LOG_DET_KKT]
             best = max(best, parts[slot])
             minima += 1
+            free += 1 if figure[NEUTRAL] > 0.0 else 0
             if figure[ENERGY] < lowest:
                 lowest = figure[ENERGY]
                 fill_frames(trial, form, centres, frames)
@@ -127,4 +136,5 @@ def scan_molecule(
     figures[LOG_J] = best + math.log(total) if minima else math.nan
     figures[MINIMA] = minima
     figures[FAILED_STARTS] = failed
+    figures[FREE_REGISTERS] = free
     return minima > 0
