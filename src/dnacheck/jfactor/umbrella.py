@@ -247,23 +247,27 @@ class _Ladders:
         )
 
 
-def _extrapolated(joined: JoinedSeries) -> tuple[float, float]:
-    """ln of the density at width zero, a straight line in the width's square, and its error.
-
-    Twice the narrow minus the wide mean; the error takes ln of the narrow one and of the ratio
-    as independent, which the scatter of the copies checks.
-    """
-    wide, narrow = joined.log_means[:2]
-    ratio = math.exp(wide - narrow)
-    weight = ratio / max(2.0 - ratio, 0.1)
-    log_density = float(narrow) + math.log(max(2.0 - ratio, 0.1))
-    return log_density, math.hypot(float(joined.errors[1]), weight * joined.ratio_error)
-
-
 def _rate(accepted: Array) -> Array:
     with np.errstate(invalid="ignore"):
         rate: Array = accepted[..., 0] / np.where(accepted[..., 1] > 0, accepted[..., 1], np.nan)
     return rate
+
+
+def _extrapolated(joined: JoinedSeries) -> tuple[float, float]:
+    """ln of the density at width zero, a straight line in the width's square, and its error.
+
+    Twice the narrow mean minus the wide one. With a = 2/(2 - wide/narrow) and b = a - 1, the
+    logarithm's error is a d ln narrow - b d ln wide, and the covariance of the two follows from
+    the errors of both and of their ratio.
+    """
+    wide, narrow = joined.log_means[:2]
+    left = max(2.0 - math.exp(wide - narrow), 0.1)
+    a = 2.0 / left
+    b = a - 1.0
+    wide_variance, narrow_variance = joined.errors[:2] ** 2
+    twice_covariance = wide_variance + narrow_variance - joined.ratio_error**2
+    variance = a * a * narrow_variance + b * b * wide_variance - a * b * twice_covariance
+    return float(narrow) + math.log(left), math.sqrt(max(float(variance), 0.0))
 
 
 def umbrella_estimate(
