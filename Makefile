@@ -27,6 +27,11 @@ $(PY):
 	if [ -z "$$python" ]; then echo "make: needs Python 3.11 or newer with venv; set PYTHON=..." >&2; exit 1; fi; \
 	echo "creating $(VENV) with $$python"; $$python -m venv $(VENV)
 
+# Imported once after installing, so that their bytecode is on disk: compiling it anew costs every
+# start seconds, where Python is told not to write any.
+HEAVY := numba, scipy.optimize, Bio.SeqIO, matplotlib.pyplot, plotly, MDAnalysis, openmm.app, \
+	rich.progress, pydantic, jinja2, pytest, hypothesis
+
 # uv, at the version and hash of the lock, installs in seconds what takes pip a minute. Where it
 # cannot (an index known to pip only, say), pip does the same work.
 $(STAMP): requirements.lock pyproject.toml | $(PY)
@@ -38,6 +43,7 @@ $(STAMP): requirements.lock pyproject.toml | $(PY)
 		echo "uv cannot reach the packages; pip installs them (about a minute)"; \
 		$(PIP) install --require-hashes --no-deps --no-compile -r requirements.lock; }
 	@$(PIP) install --no-deps --no-build-isolation --editable .
+	@env -u PYTHONDONTWRITEBYTECODE $(PY) -c "import $(HEAVY)" >/dev/null 2>&1 || true
 	@touch $@
 
 validate: $(STAMP) ## compute the default scene and write report/report.html

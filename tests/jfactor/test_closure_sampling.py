@@ -1,4 +1,4 @@
-"""Exact-closure sampling against brute force, the values of NUMERICS, and itself."""
+"""Exact-closure sampling against brute force, values of a separate prototype, and itself."""
 
 import math
 from dataclasses import replace

@@ -28,7 +28,7 @@ from dnacheck.numerics.outcome import InputError, SolveError
 from dnacheck.ring.search import RingSearch, find_rings
 
 SIGMAS = 3.0
-# -ln J by exact-closure sampling of a separate prototype (NUMERICS section 5).
+# -ln J by exact-closure sampling with a separate prototype.
 CLOSURE_SAMPLING = {"09T15": (15.531, 0.010), "08T15": (15.762, 0.011)}
 
 

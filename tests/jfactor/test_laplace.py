@@ -56,7 +56,7 @@ def test_a_wrong_unit_of_length_would_be_seen():
 
 @pytest.mark.parametrize("name", embedded_names())
 def test_entropy_of_the_eleven_lies_where_it_was_measured(name):
-    """NUMERICS section 5: -ln J - E from 5.2 to 5.9; the paper fitted 5.2."""
+    """-ln J - E was 5.2 to 5.9 with a separate prototype; the paper fitted 5.2."""
     search = find_rings(build_chain(embedded(name)))
     result = laplace(search)
     lowest = result.links[0]

@@ -2,7 +2,8 @@
 
 After Alexandrowicz (1969), Levene & Crothers (1986) and Czapla, Swigon & Olson (2006). M first and
 M second halves make M^2 chains; those that meet within a window about closure, divided by the
-window's volume, estimate the density f of closure, and J = f / l^3 in mol/L (NUMERICS section 5).
+window's volume, estimate the density f of closure, and J = f / l^3 in mol/L
+(docs/theory/jfactors.md).
 
 Plain sampling draws both halves from the free chain. Tilted sampling draws them from a mixture of
 Gaussians centred on closed shapes (:mod:`dnacheck.jfactor.tilts`). The density of the pairs is

@@ -1,12 +1,13 @@
 """Laplace's approximation of the J factor, from the log-determinant that a ring search leaves.
 
-With n = 3N angles, energies in RT and lengths in Å, one minimum contributes (NUMERICS section 5)
+With n = 3N angles, energies in RT and lengths in Å, one minimum contributes
 
     J = 8 pi^2 exp(-E) sqrt(det(K / 2 pi)) (2 pi)^((n - 6)/2) / sqrt(|det KKT|),
 
 where |det KKT| = det(Z^T H Z) det(G G^T): H is the Hessian of the Lagrangian, G the 6 x n
 Jacobian of closure, Z an orthonormal basis of its null space. Steps as the unit of length and
 reduced energies leave the factor (s / 2 pi)^3 / l^3, with s RT per reduced unit and l the rise.
+Derived in docs/theory/jfactors.md.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from typing import Any
 from dnacheck.numerics.outcome import InputError
 
 PER_CUBIC_ANGSTROM_IN_MOLAR = 1660.539
-"""One molecule per cubic ångström in mol/L, 1e27 Å^3/L over Avogadro's number (NUMERICS 5)."""
+"""One molecule per cubic ångström in mol/L, 1e27 Å^3/L over Avogadro's number."""
 
 
 class JStatus(enum.Enum):

@@ -38,7 +38,7 @@ RATIOS = tuple(0.5 + k / 15.0 for k in range(16))
 """Twist ratios of Figures 12 to 19: sixteen, evenly spaced (Section X)."""
 PUBLISHED_SHIFTS = {"trifonov2": (6.5, 5.2), "trifonov": (7.5, 5.8), "desantis": (8.6, 6.1)}
 """Delta S / R at K3/K1 = 0.5 and 1.5 from the captions of Figures 17 to 19; Figure 19's caption
-read as NUMERICS section 2 mends it."""
+read as docs/theory/misprints.md mends it."""
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 A tilt is a closed shape q* with the Gaussian of the free chain moved there. With K the stiffness
 in RT and q^ the ground angles, a chain drawn from it is free-chain distributed with the weight
-exp(-E* - g.(q - q*)), g = K (q* - q^), E* its elastic energy (NUMERICS section 5). At an
+exp(-E* - g.(q - q*)), g = K (q* - q^), E* its elastic energy (docs/theory/jfactors.md). At an
 equilibrium g = -G^T m, so on closed chains the exponent vanishes to first order, and off them it
 is m.c, c the closure mismatch.
 

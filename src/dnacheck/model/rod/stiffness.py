@@ -20,7 +20,7 @@ from dnacheck.numerics.outcome import InputError
 
 Array = NDArray[np.float64]
 
-# theta turns by -theta about d1 (NUMERICS convention of (2.1)): sign of (u1, u2, u3) against
+# theta turns by -theta about d1 in the convention of (2.1): sign of (u1, u2, u3) against
 # (theta, phi, tau).
 _SIGN = np.array([-1.0, 1.0, 1.0])
 
