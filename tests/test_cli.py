@@ -27,7 +27,6 @@ HEAVY = {
     "pymbar",
     "rich",
     "scipy",
-    "tomlkit",
 }
 
 
