@@ -1,38 +1,19 @@
-"""J factors: Table III, Figures 17 to 19, and independent methods that must agree."""
+"""Table III, and Figures 17 to 19: free energies against experiment."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from dnacheck.numerics.outcome import SolveError
+from dnacheck.validate.checks.jfactors.runs import sampled
 from dnacheck.validate.context import Context
 from dnacheck.validate.published import PAPER
-from dnacheck.validate.registry import Check, Findings, Group, Level
-from dnacheck.validate.scene import Scene
-from dnacheck.validate.sections import Block, Column, Figure, Note, Table
+from dnacheck.validate.registry import Findings
+from dnacheck.validate.sections import Column, Figure, Note, Table
 from dnacheck.validate.verdict import CheckResult, Rule, judge, must_fail
 
-if TYPE_CHECKING:
-    from dnacheck.jfactor.result import JFactor
-    from dnacheck.model.chain import Chain
-
-SIGMAS = 3.0
-"""Methods must meet within so many combined standard errors."""
-LARGEST_LAPLACE_BIAS = 0.6
-"""0.3 to 0.5 was seen on the eleven molecules."""
 _SETS = {"trifonov2": "Trifonov II", "trifonov": "Trifonov", "desantis": "De Santis"}
-_BEST = ("09T15", "08T15", "08A17")
-"""The three best cyclizers of Table III, on which the slow methods are tried."""
-
-
-def _sampled(chain: Chain, tolerance: float, seed: int) -> JFactor:
-    from dnacheck.jfactor.closure_sampling import ClosureOptions, sample_closure
-
-    return sample_closure(chain, ClosureOptions(tolerance=tolerance), seed)
 
 
 def table3(context: Context) -> Findings:
@@ -41,7 +22,7 @@ def table3(context: Context) -> Findings:
 
     seeds = iter(range(10_000))
     table = free_energy_table(
-        lambda chain: _sampled(chain, 0.01, context.seed + next(seeds)), model="continuum"
+        lambda chain: sampled(chain, 0.01, context.seed + next(seeds)), model="continuum"
     )
     inside = next(c for c in table.columns if "inside" in c.name)
     steps = next(c for c in table.columns if "Table II" in c.name)
@@ -115,7 +96,7 @@ def table3(context: Context) -> Findings:
         )
     second = by_set["trifonov2"]
     assert second.shift is not None
-    own_shift, own_rms = _papers_own()
+    own_shift, own_rms = papers_own()
     results += [
         judge(
             "jfactor.table3[Trifonov II]",
@@ -214,7 +195,7 @@ def table3(context: Context) -> Findings:
     return Findings(results, [block, fitted, other])
 
 
-def _papers_own() -> tuple[float, float]:
+def papers_own() -> tuple[float, float]:
     """What the paper's own tables say of its Trifonov II column.
 
     Returns the shift that fits Table II's continuum energies to Table III's experiment, and the
@@ -279,7 +260,7 @@ def shifts(context: Context) -> Findings:
                 }
             )
         if sweep.angle_set == "trifonov2":
-            low, high = sweep.published_shifts[0], _papers_own()[0]
+            low, high = sweep.published_shifts[0], papers_own()[0]
             results += [
                 judge(
                     f"jfactor.shifts[Trifonov II, {sweep.ratios[index]:g}]",
@@ -313,223 +294,3 @@ def shifts(context: Context) -> Findings:
         rows,
     )
     return Findings(results, [*figures, table])
-
-
-def _variants(context: Context) -> list[Chain]:
-    from dnacheck.validate.rings import scene_chain
-
-    return [scene_chain(context.scene, molecule) for molecule in context.molecules]
-
-
-def _row(result: JFactor) -> dict[str, Any]:
-    return {
-        "name": result.target,
-        "minus_lnJ": result.minus_lnJ,
-        "stderr": result.stderr,
-        "bias": result.bias_bound,
-        "effective": result.effective_samples,
-        "seconds": result.seconds,
-        "status": result.status.value,
-    }
-
-
-def _method_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table:
-    return Table(name, name, [Column("name", "Molecule")], rows)
-
-
-def laplace(context: Context) -> Findings:
-    """Laplace, plain and register-integrated, against exact-closure sampling."""
-    from dnacheck.jfactor.laplace import laplace as plain
-    from dnacheck.jfactor.register import register_laplace
-
-    wanted = context.scene.wanted.ln_J or 0.05
-    results, rows = [], []
-    for index, chain in enumerate(_variants(context)):
-        best = _sampled(chain, min(0.01, wanted), context.seed + index)
-        held = register_laplace(chain)
-        try:
-            simple = plain(chain).minus_lnJ
-        except SolveError:
-            simple = None
-        rows.append(
-            {
-                **_row(best),
-                "n_bp": chain.n_steps,
-                "J": best.J_molar,
-                "laplace": simple,
-                "register": held.minus_lnJ,
-                "register_bias": held.minus_lnJ - best.minus_lnJ,
-            }
-        )
-        results += [
-            judge(
-                f"jfactor.laplace[{chain.name} error]",
-                "standard error and bias bound of −ln J by exact-closure sampling",
-                best.total_error,
-                min(0.02, wanted),
-                Rule.AT_MOST,
-                "batches of the sampler, and its bounds",
-                "0.02 has been reached in 0.2 s",
-                unit="RT",
-            ),
-            judge(
-                f"jfactor.laplace[{chain.name}]",
-                "register-integrated Laplace against exact-closure sampling",
-                abs(held.minus_lnJ - best.minus_lnJ),
-                LARGEST_LAPLACE_BIAS,
-                Rule.AT_MOST,
-                "what Laplace's approximation leaves out; 0.3 to 0.5 seen on the eleven molecules",
-                "beyond it one of the two would be wrong",
-                unit="RT",
-                got_sigma=best.stderr,
-            ),
-        ]
-    return Findings(results, [_method_table("closure", rows)])
-
-
-def _agreement(
-    name: str, item: str, other: JFactor, best: JFactor, widest: float, what: str
-) -> CheckResult:
-    """A method against exact-closure sampling."""
-    return judge(
-        f"{name}[{item}]",
-        f"−ln J by {what}",
-        other.minus_lnJ,
-        best.minus_lnJ,
-        Rule.SIGMAS,
-        "exact-closure sampling, an independent method",
-        "both with standard errors from independent batches",
-        SIGMAS,
-        "RT",
-        got_sigma=other.total_error,
-        expected_sigma=best.total_error,
-        widest_sigma=widest,
-    )
-
-
-def half_chain(context: Context) -> Findings:
-    """Tilted half chains against exact-closure sampling."""
-    from dnacheck.jfactor.half_chain import HalfChainOptions
-    from dnacheck.jfactor.half_chain import half_chain as run
-
-    results, rows = [], []
-    chosen = _variants(context) if context.level is Level.FULL else _few(context)
-    for index, chain in enumerate(chosen):
-        best = _sampled(chain, 0.01, context.seed + index)
-        other = run(chain, HalfChainOptions(), context.rng(index))
-        rows.append(_row(other))
-        results.append(
-            _agreement("jfactor.half_chain", chain.name, other, best, 0.2, "tilted half chains")
-        )
-    return Findings(results, [_method_table("half-chain", rows)])
-
-
-def _few(context: Context) -> list[Chain]:
-    """The best cyclizers and the first molecule, of the paper's the worst."""
-    first = _variants(context)[0]
-    return [first, *(chain for chain in _best_cyclizers(context) if chain is not first)]
-
-
-def _best_cyclizers(context: Context) -> list[Chain]:
-    from dnacheck.validate.rings import scene_chain
-
-    known = {molecule.name: molecule for molecule in context.molecules}
-    names = [name for name in _BEST if name in known] or list(known)[:1]
-    return [scene_chain(context.scene, known[name]) for name in names]
-
-
-def metropolis(context: Context) -> Findings:
-    """Restrained Metropolis sampling with MBAR against exact-closure sampling."""
-    from dnacheck.jfactor.umbrella import UmbrellaOptions
-    from dnacheck.jfactor.umbrella import metropolis as run
-
-    full = context.level is Level.FULL
-    options = UmbrellaOptions(samples=1000 if full else 100, burn_in=100 if full else 50)
-    results, rows = [], []
-    for index, chain in enumerate(_best_cyclizers(context)[: None if full else 2]):
-        best = _sampled(chain, 0.01, context.seed + index)
-        other = run(chain, options, context.rng(index))
-        rows.append(_row(other))
-        widest = 0.15 if full else 0.6
-        words = "restrained Metropolis sampling joined by MBAR"
-        results.append(_agreement("jfactor.metropolis", chain.name, other, best, widest, words))
-    return Findings(results, [_method_table("metropolis", rows)])
-
-
-def assemble(findings: Mapping[str, Findings]) -> Sequence[Block]:
-    """One table of all methods, then what each check has to show."""
-    methods = {
-        block.id: {row["name"]: row for row in block.rows}
-        for found in findings.values()
-        for block in found.blocks
-        if isinstance(block, Table) and block.id in ("closure", "half-chain", "metropolis")
-    }
-    others = [
-        block
-        for found in findings.values()
-        for block in found.blocks
-        if not (isinstance(block, Table) and block.id in methods)
-    ]
-    if "closure" not in methods:
-        return others
-    rows = []
-    for name, best in methods["closure"].items():
-        row = {"name": name, **best}
-        row["laplace_bias"] = None if best["laplace"] is None else best["register_bias"]
-        for method in ("half-chain", "metropolis"):
-            found = methods.get(method, {}).get(name)
-            if found:
-                row[method] = found["minus_lnJ"]
-                row[f"{method}-error"] = math.hypot(found["stderr"], found["bias"] or 0.0)
-        rows.append(row)
-    columns = [
-        Column("name", "Molecule"),
-        Column("J", "J", "mol/L", ".2e"),
-        Column("minus_lnJ", "−ln J", "", ".3f", "", "Exact closure"),
-        Column("stderr", "±", "", ".3f", "", "Exact closure"),
-        Column("half-chain", "−ln J", "", ".3f", "", "Half chains"),
-        Column("half-chain-error", "±", "", ".3f", "", "Half chains"),
-        Column("metropolis", "−ln J", "", ".2f", "", "Metropolis, MBAR"),
-        Column("metropolis-error", "±", "", ".2f", "", "Metropolis, MBAR"),
-        Column("laplace", "plain", "", ".3f", "", "Laplace"),
-        Column("register", "register", "", ".3f", "", "Laplace"),
-        Column("register_bias", "its bias", "", "+.2f", "", "Laplace"),
-    ]
-    table = Table(
-        "methods",
-        "J factors by five methods",
-        columns,
-        rows,
-        "−ln J, J in mol/L, nothing fitted. ± are standard errors with bias bounds added in "
-        "quadrature; Laplace has none of its own, its bias is measured against exact closure.",
-        summary=len(rows) <= 30,
-    )
-    return [table, *others]
-
-
-def _paper(scene: Scene) -> str | None:
-    if not scene.checks.against_paper or len(scene.resolved) < 11:
-        return "Table III needs all eleven molecules of the paper"
-    return None
-
-
-_NEEDS = ("ln_J",)
-
-GROUP = Group(
-    "jfactor",
-    "J factors",
-    "Cyclization free energies −ln J with the entropy computed, by independent methods.",
-    (
-        Check("jfactor.laplace", "exact-closure sampling and Laplace", laplace, 4.0, _NEEDS,
-              requires=("dnacheck.jfactor.closure_sampling",)),
-        Check("jfactor.half_chain", "tilted half chains", half_chain, 16.0, _NEEDS,
-              requires=("dnacheck.jfactor.half_chain",)),
-        Check("jfactor.metropolis", "Metropolis with MBAR, best cyclizers", metropolis, 40.0,
-              _NEEDS, requires=("dnacheck.jfactor.umbrella",)),
-        Check("jfactor.table3", "Table III", table3, 6.0, _NEEDS, applies=_paper,
-              requires=("dnacheck.jfactor.table3",)),
-        Check("jfactor.shifts", "entropy shifts (Figures 17 to 19)", shifts, 5.0, _NEEDS,
-              applies=_paper, requires=("dnacheck.jfactor.table3",)),
-    ),
-    assemble,
-)  # fmt: skip
