@@ -8,6 +8,10 @@ from dataclasses import dataclass
 from dnacheck.validate.registry import Check, Level, all_checks
 from dnacheck.validate.scene import Scene
 
+COMPARING_GROUPS = ("jfactor", "bead_chain")
+"""Groups that compute a quantity again by independent methods; the quantity itself, no dearer than
+its accuracy asks, comes from the group ``wanted``."""
+
 
 @dataclass(frozen=True)
 class Step:
@@ -60,6 +64,9 @@ def _decide(check: Check, scene: Scene, level: Level, only: Sequence[Check] | No
     absent = [name for name in check.needs if name not in scene.wants]
     if absent:
         return Step(check, False, f"the scene does not want {' and '.join(absent)}")
+    compared = scene.checks.compare_methods or scene.checks.against_paper
+    if check.group in COMPARING_GROUPS and not compared:
+        return Step(check, False, "the scene does not ask to compare methods ([checks])")
     reason = check.applies(scene) if check.applies else None
     if reason:
         return Step(check, False, reason)

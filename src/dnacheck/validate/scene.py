@@ -91,6 +91,7 @@ class Checks(_Part):
 
     groups: Literal["all"] | list[str] = "all"
     hard_cases: bool = False
+    compare_methods: bool = False
     against_paper: bool = False
 
 

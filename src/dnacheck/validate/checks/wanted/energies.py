@@ -1,14 +1,21 @@
-"""What the scene asked for, by the cheapest model that a pilot shows to be accurate enough."""
+"""Ring energies of the chain and of the rod, by the cheapest model that is accurate enough."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from dnacheck.validate.context import Context
-from dnacheck.validate.registry import Check, Findings, Group, Level
+from dnacheck.validate.pilots import (
+    USED,
+    Candidate,
+    choose,
+    judge_accuracy,
+    pilot_table,
+    pilots,
+    variants_of,
+)
+from dnacheck.validate.registry import Findings
 from dnacheck.validate.sections import Column, Table
 from dnacheck.validate.verdict import CheckResult, Rule, judge, must_fail
 
@@ -18,134 +25,30 @@ if TYPE_CHECKING:
 
 SHOWN_ROWS = 500
 LARGEST_RESIDUAL = 1e-9
-_PILOTS = 3
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A way to a quantity; candidates are listed from the cheapest to the dearest."""
-
-    name: str
-    compute: Callable[[Chain], float]
-
-
-@dataclass(frozen=True)
-class Choice:
-    """The candidate that a pilot selected, with what the pilot measured."""
-
-    chosen: Candidate
-    error: float
-    rows: Sequence[dict[str, Any]]
-
-
-def pilots(chains: Sequence[Chain]) -> list[Chain]:
-    """The shortest, the median and the longest molecule."""
-    ordered = sorted(chains, key=lambda chain: (chain.n_steps, chain.name))
-    picks = {0, len(ordered) // 2, len(ordered) - 1}
-    return [ordered[index] for index in sorted(picks)][:_PILOTS]
-
-
-def choose(
-    candidates: Sequence[Candidate],
-    reference: Callable[[Chain], float],
-    chains: Sequence[Chain],
-    accuracy: float,
-    relative: bool = True,
-) -> Choice:
-    """The first candidate whose largest error on the pilots is within the accuracy.
-
-    Every candidate up to it is measured, and the next one, so that the report can show what the
-    dearer model would have cost. Where none suffices the last is taken. The decision rests on
-    errors and on the fixed order, not on measured times, so it is the same on every machine.
-    """
-    exact = [reference(chain) for chain in chains]
-    rows: list[dict[str, Any]] = []
-    chosen: Candidate | None = None
-    error = float("inf")
-    after = False
-    for index, candidate in enumerate(candidates):
-        if after:
-            rows.append({"model": candidate.name, "decision": "left out: dearer, not needed"})
-            continue
-        candidate.compute(chains[0])  # compiles, so that the time is that of warm code
-        began = time.perf_counter()
-        values = [candidate.compute(chain) for chain in chains]
-        seconds = (time.perf_counter() - began) / len(chains)
-        errors = [
-            abs(value - truth) / (abs(truth) if relative else 1.0)
-            for value, truth in zip(values, exact, strict=True)
-        ]
-        worst = max(errors)
-        row = {"model": candidate.name, "error": worst, "ms": 1e3 * seconds}
-        if chosen is not None:
-            row["decision"] = "left out: dearer, not needed"
-            after = True
-        elif worst <= accuracy or index == len(candidates) - 1:
-            chosen, error = candidate, worst
-            row["decision"] = "chosen"
-        else:
-            row["decision"] = "left out: not accurate enough"
-        rows.append(row)
-    assert chosen is not None
-    return Choice(chosen, error, rows)
-
-
-def _pilot_table(name: str, title: str, choice: Choice, accuracy: float, used: str) -> Table:
-    return Table(
-        f"pilot-{name}",
-        title,
-        [
-            Column("model", "Model"),
-            Column("error", "largest error measured", "", ".1e"),
-            Column("ms", "time per molecule", "ms", ".1f"),
-            Column("decision", "Decision"),
-        ],
-        choice.rows,
-        f"Wanted: {accuracy:g}. Measured on {used}; candidates from the cheapest to the dearest.",
-    )
-
-
-def _accuracy(name: str, quantity: str, error: float, accuracy: float) -> CheckResult:
-    return judge(
-        f"{name}[accuracy]",
-        f"error of the {quantity} measured on the pilot molecules",
-        error,
-        accuracy,
-        Rule.AT_MOST,
-        "the scene's wish; the reference is at least ten times finer",
-        "asked for by the scene",
-    )
-
-
-def _variants(context: Context) -> list[tuple[str, float, Chain]]:
-    """Every molecule with every angle set and twist ratio of the scene."""
-    from dnacheck.validate.rings import scene_chain
-
-    model = context.scene.model
-    return [
-        (angles, ratio, scene_chain(context.scene, molecule, angles, ratio))
-        for angles in model.angles
-        for ratio in model.twist_ratios
-        for molecule in context.molecules
-    ]
 
 
 def energy(context: Context) -> Findings:
     """Ring energies of the wedge chain."""
+    from dnacheck.model.rod import build_rod
+    from dnacheck.ring.continuum import lowest_continuum_ring
     from dnacheck.ring.discrete import NewtonOptions
     from dnacheck.ring.search import SearchOptions, find_rings
     from dnacheck.validate import rings
 
     accuracy = context.scene.wanted.energy
     assert accuracy is not None
-    variants = _variants(context)
+    variants = variants_of(context)
     options = rings.rod_options(context.scene)
     fine = SearchOptions(newton=NewtonOptions(tolerance=1e-12))
     ratio = variants[0][1]
+
+    def by_rod(chain: Chain) -> float:
+        return lowest_continuum_ring(build_rod(chain, options)).lowest.energy
+
     chosen = choose(
         [
             Candidate("discrete chain", lambda chain: find_rings(chain).lowest.energy),
-            Candidate("continuum rod", lambda chain: rings.lowest_continuum(chain, options).energy),
+            Candidate("continuum rod", by_rod),
         ],
         lambda chain: find_rings(chain, fine).lowest.energy,
         pilots([chain for _, at, chain in variants if at == ratio]),
@@ -196,7 +99,7 @@ def energy(context: Context) -> Findings:
             "equations (4.6), closure included",
             "the energy's error is of the order of its square",
         ),
-        _accuracy("wanted.energy", "ring energy", chosen.error, accuracy),
+        judge_accuracy("wanted.energy[accuracy]", "ring energy", chosen.error, accuracy),
         _control(variants[0][2], accuracy),
     ]
     several = len(context.scene.model.angles) * len(context.scene.model.twist_ratios) > 1
@@ -222,10 +125,9 @@ def energy(context: Context) -> Findings:
         summary=not context.scene.checks.against_paper and len(rows) <= 30,
         collapsed=len(rows) > 30,
     )
-    used = "the shortest, median and longest molecule"
     return Findings(
         results,
-        [table, _pilot_table("energy", "Which model gives the energies", chosen, accuracy, used)],
+        [table, pilot_table("energy", "Which model gives the energies", chosen, accuracy, USED)],
     )
 
 
@@ -239,7 +141,7 @@ def _control(chain: Chain, accuracy: float) -> CheckResult:
     factor = 1.0 + 4.0 * accuracy
     wrong = lowest_ring(replace(chain, stiffness=factor * chain.stiffness)).energy
     return must_fail(
-        _accuracy("wanted.energy[control]", "ring energy", abs(wrong / truth - 1.0), accuracy),
+        judge_accuracy("wanted.energy[control]", "ring energy", abs(wrong / truth - 1.0), accuracy),
         f"all stiffnesses are {100.0 * 4.0 * accuracy:.2g} % too large",
     )
 
@@ -257,7 +159,7 @@ def continuum_energy(context: Context) -> Findings:
 
     accuracy = context.scene.wanted.continuum_energy
     assert accuracy is not None
-    variants = _variants(context)
+    variants = variants_of(context)
     options = rings.rod_options(context.scene)
 
     def compute(mesh: ContinuumOptions) -> Callable[[Chain], float]:
@@ -279,7 +181,11 @@ def continuum_energy(context: Context) -> Findings:
         pilots([chain for _, at, chain in variants if at == variants[0][1]]),
         accuracy,
     )
-    results = [_accuracy("wanted.continuum_energy", "continuum energy", chosen.error, accuracy)]
+    results = [
+        judge_accuracy(
+            "wanted.continuum_energy[accuracy]", "continuum energy", chosen.error, accuracy
+        )
+    ]
     rows = [
         {
             "name": chain.name,
@@ -303,18 +209,5 @@ def continuum_energy(context: Context) -> Findings:
         collapsed=True,
     )
     title = "Which mesh gives the continuum energies"
-    used = "the shortest, median and longest molecule against a reference mesh of degree 6"
-    return Findings(results, [table, _pilot_table("continuum", title, chosen, accuracy, used)])
-
-
-GROUP = Group(
-    "wanted",
-    "What the scene asked for",
-    "Each quantity by the cheapest model that a pilot run shows to be accurate enough.",
-    (
-        Check("wanted.energy", "ring energies by the cheapest model", energy, 2.0, ("energy",),
-              Level.QUICK),
-        Check("wanted.continuum_energy", "continuum energies on the coarsest mesh that suffices",
-              continuum_energy, 3.0, ("continuum_energy",), Level.QUICK),
-    ),
-)  # fmt: skip
+    used = f"{USED}, against a reference mesh of degree 6"
+    return Findings(results, [table, pilot_table("continuum", title, chosen, accuracy, used)])

@@ -1,0 +1,91 @@
+"""How far the discrete and the continuum ring are apart, on the coarsest mesh that suffices."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from dnacheck.validate.context import Context
+from dnacheck.validate.pilots import (
+    USED,
+    Candidate,
+    choose,
+    judge_accuracy,
+    pilot_table,
+    pilots,
+    variants_of,
+)
+from dnacheck.validate.registry import Findings
+from dnacheck.validate.sections import Column, Table
+
+if TYPE_CHECKING:
+    from dnacheck.model.chain import Chain
+    from dnacheck.ring.continuum import ContinuumOptions
+
+SHOWN_ROWS = 500
+
+
+def shape(context: Context) -> Findings:
+    """Rms distance of base-pair centres of the two models, superposed at best."""
+    from dnacheck.ring.continuum import ContinuumOptions, lowest_continuum_ring
+    from dnacheck.ring.reconstruct import reconstruct, rms_difference
+    from dnacheck.validate import rings
+
+    accuracy = context.scene.wanted.shape_A
+    assert accuracy is not None
+    variants = variants_of(context)
+    options = rings.rod_options(context.scene)
+
+    def compute(mesh: ContinuumOptions) -> Callable[[Chain], float]:
+        def distance(chain: Chain) -> float:
+            ring = lowest_continuum_ring(rings.rod_of(chain, options), options=mesh).lowest
+            pairs = reconstruct(ring, chain.step_form)
+            return rms_difference(pairs.centres, rings.lowest_ring(chain).centres, chain.rise_A)
+
+        return distance
+
+    candidates = [
+        Candidate(
+            f"{k} intervals of degree {m}",
+            compute(ContinuumOptions(intervals=k, degree=m, adapt=False)),
+        )
+        for k, m in ((15, 3), (20, 4), (30, 6))
+    ]
+    candidates.append(
+        Candidate("mesh adapted to 1e-8", compute(ContinuumOptions(energy_tolerance=1e-8)))
+    )
+    chosen = choose(
+        candidates,
+        compute(ContinuumOptions(energy_tolerance=1e-10, degree=6)),
+        pilots([chain for _, at, chain in variants if at == variants[0][1]]),
+        accuracy,
+        relative=False,
+    )
+    rows = [
+        {
+            "name": chain.name,
+            "angles": angles,
+            "ratio": ratio,
+            "rms": chosen.chosen.compute(chain),
+        }
+        for angles, ratio, chain in variants
+    ]
+    table = Table(
+        "shapes",
+        "Distance between the discrete and the continuum ring",
+        [
+            Column("name", "Molecule"),
+            Column("angles", "Angles"),
+            Column("ratio", "K_3/K_1", "", "g"),
+            Column("rms", "rms distance", "Å", ".2f"),
+        ],
+        rows[:SHOWN_ROWS],
+        f"Base-pair centres after optimal superposition; {chosen.chosen.name}.",
+        collapsed=True,
+    )
+    title = "Which mesh gives the shapes"
+    used = f"{USED}, against a mesh adapted to 1e-10"
+    return Findings(
+        [judge_accuracy("wanted.shape_A[accuracy]", "distance", chosen.error, accuracy, "Å")],
+        [table, pilot_table("shapes", title, chosen, accuracy, used)],
+    )
