@@ -64,7 +64,7 @@ def test_a_tolerance_out_of_reach_gives_the_best_so_far(capsys):
     assert "tolerance was not met" in record["status"]
 
 
-@pytest.mark.parametrize("method", ["laplace", "register-laplace", "closure"])
+@pytest.mark.parametrize("method", ["laplace", "register-laplace", "corrected-laplace", "closure"])
 def test_methods_by_name(capsys, method):
     code, out, _ = run(capsys, "jfactor", "15A09", "--json", "--method", method)
     record = json.loads(out)

@@ -26,7 +26,15 @@ if TYPE_CHECKING:
     from dnacheck.ring.search import RingSearch
 
 EXIT_NOT_CONVERGED = 3
-METHODS = ("auto", "laplace", "register-laplace", "closure", "half-chain", "metropolis")
+METHODS = (
+    "auto",
+    "laplace",
+    "register-laplace",
+    "corrected-laplace",
+    "closure",
+    "half-chain",
+    "metropolis",
+)
 
 
 @click.command(epilog="Example:  dnacheck jfactor 08T15 --tolerance 0.02")
@@ -152,6 +160,10 @@ def _computed(
         from dnacheck.jfactor.register import register_laplace
 
         return register_laplace(search), ""
+    if method == "corrected-laplace":
+        from dnacheck.jfactor.anharmonic import AnharmonicOptions, corrected_laplace
+
+        return corrected_laplace(search, AnharmonicOptions(tolerance=tolerance), run.seed), ""
     if method == "closure":
         from dnacheck.jfactor.closure_sampling import ClosureOptions, ClosureSampler
         from dnacheck.jfactor.register import register_profile

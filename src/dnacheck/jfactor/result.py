@@ -68,7 +68,8 @@ class JFactor:
         Name of the molecule.
     n_bp : int
     method : str
-        ``laplace``, ``register-laplace``, ``closure``, ``half-chain`` or ``metropolis``.
+        ``laplace``, ``register-laplace``, ``corrected-laplace``, ``closure``, ``half-chain``,
+        ``half-chain-plain`` or ``metropolis``.
     minus_lnJ : float
         -ln J, J in mol/L.
     stderr : float
