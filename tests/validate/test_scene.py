@@ -4,15 +4,18 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dnacheck.cli import main
+from dnacheck.model.data_files import data_directory
 from dnacheck.numerics.outcome import InputError
 from dnacheck.validate.plan import make_plan
 from dnacheck.validate.registry import Level
-from dnacheck.validate.scene import shipped_scenes
+from dnacheck.validate.rings import scene_chain
+from dnacheck.validate.scene import FILLED_IN, shipped_scenes
 from dnacheck.validate.scene_file import load_scene, read_scene
+from dnacheck.validate.state import run_key
 from dnacheck.validate.toml_lines import line_numbers
 
 GOOD = """title = "t"
@@ -60,6 +63,8 @@ BROKEN = {
     "infinite accuracy": (changed("0.005", "inf"), "line 10.*finite"),
     "too fine": (changed("0.005", "1e-15"), "line 10.*double precision"),
     "ln J too fine": (changed("energy = 0.005", "ln_J = 1e-5"), "line 10.*0.002 or more"),
+    "mean energy too fine": (changed("energy = 0.005", "thermal_energy = 1e-5"),
+                             "line 10.*0.001 or more"),
     "ratio zero": (changed("[1.5]", "[0.0]"), "line 7.*greater than 0"),
     "no ratio": (changed("[1.5]", "[]"), "line 7"),
     "ratio a number": (changed("[1.5]", "1.5"), "line 7.*list"),
@@ -111,7 +116,7 @@ def test_there_are_thirty_broken_scenes():
     assert len(BROKEN) >= 30
 
 
-@pytest.mark.parametrize("case", ["unknown key", "bad letters", "not TOML"])
+@pytest.mark.parametrize("case", BROKEN)
 def test_exit_code_and_one_line(case, tmp_path, capsys):
     path = tmp_path / "scene.toml"
     path.write_text(BROKEN[case][0])
@@ -119,6 +124,8 @@ def test_exit_code_and_one_line(case, tmp_path, capsys):
     error = capsys.readouterr().err.strip()
     assert "\n" not in error
     assert "Traceback" not in error
+    assert str(path) in error
+    assert re.search(r"[;:] ", error)  # what is wrong, and the mend
     assert not (tmp_path / "out").exists()
 
 
@@ -136,6 +143,48 @@ def test_any_extra_key_is_refused(tmp_path_factory, key, value):
     with pytest.raises(InputError) as caught:
         read_scene(path)
     assert "\n" not in str(caught.value)
+
+
+TABLES = {
+    "molecules": ("embedded", "fasta", "sequences", "homopolymers", "random"),
+    "model": ("angles", "twist_ratios", "persistence_length_A", "rise_A", "a_tracts"),
+    "continuum": ("filter_width", "intervals", "degree", "padding"),
+    "wanted": ("energy", "continuum_energy", "shape_A", "ln_J", "thermal_energy"),
+    "checks": ("groups", "hard_cases", "against_paper", "compare_methods"),
+}
+SHOWN = st.one_of(
+    st.sampled_from(["true", "false", "nan", "inf", "-inf", "0", "-1", "1e-30", "1e30", '""',
+                     "[]", "{}", "[[]]", "[{}]", "{x = 1}", '["11T15"]', "1979-05-27", "'all'"]),
+    st.integers(-10, 10).map(str),
+    st.floats(allow_nan=False, allow_infinity=False).map(repr),
+    st.text(st.characters(codec="utf-8", exclude_characters="'", categories=["L", "N", "P", "S"]),
+            max_size=8).map(lambda text: f"'{text}'"),
+    st.lists(st.integers(-3, 500), max_size=3).map(str),
+)  # fmt: skip
+
+
+@settings(max_examples=200, deadline=None)
+@given(table=st.sampled_from(sorted(TABLES)), data=st.data())
+def test_any_value_of_any_key_is_good_or_refused_in_one_line(tmp_path_factory, table, data):
+    key, shown = data.draw(st.sampled_from(TABLES[table])), data.draw(SHOWN)
+    tables = {"molecules": {"embedded": '["11T15"]'}, "wanted": {"energy": "0.005"}}
+    tables.setdefault(table, {})[key] = shown
+    lines = ['title = "t"']
+    for name, content in tables.items():
+        lines += [f"[{name}]", *(f"{k} = {v}" for k, v in content.items())]
+    path = tmp_path_factory.mktemp("s") / "scene.toml"
+    path.write_text("\n".join(lines))
+    try:
+        scene = read_scene(path)
+    except InputError as error:
+        message = str(error)
+        assert "\n" not in message
+        assert message.startswith(f"scene '{path}'")
+        places = (lines.index(f"{key} = {shown}") + 1, lines.index(f"[{table}]") + 1)
+        named = any(f"line {number}:" in message for number in places)
+        assert named or "not valid TOML" in message, (message, lines)
+    else:
+        make_plan(scene, Level.FULL)
 
 
 @pytest.mark.parametrize("name", shipped_scenes())
@@ -157,7 +206,7 @@ def test_the_template_names_every_key():
 
     text = (scenes_directory() / "template.toml").read_text()
     for name, field in Scene.model_fields.items():
-        if name in ("source", "resolved"):
+        if name in FILLED_IN:
             continue
         assert re.search(rf"\b{name}\b", text), name
         for key in getattr(field.annotation, "model_fields", {}):
@@ -198,3 +247,65 @@ def test_paths_are_relative_to_the_scene(tmp_path):
     Path(tmp_path / "sub" / "x.fasta").write_text(">one\nACGTACGTACGTACGT\n")
     text = changed('embedded = ["11T15"]', 'fasta = ["sub/x.fasta"]')
     assert [m.name for m in scene_of(tmp_path, text).molecule_list] == ["one"]
+
+
+UNIFORM = """name = "uniform"
+citation = "an example"
+derived_from = "trifonov"
+helical_repeat_bp = {}
+"""
+
+
+def with_angles(tmp_path, repeat=10.5, name="scene.toml"):
+    folder = tmp_path / "elsewhere"
+    folder.mkdir(exist_ok=True)
+    (folder / "mine.toml").write_text(UNIFORM.format(repeat))
+    path = folder / name
+    path.write_text(changed("twist_ratios = [1.5]", 'angles = ["mine.toml"]'))
+    return path
+
+
+def test_parameter_files_are_read_beside_the_scene(tmp_path, monkeypatch):
+    import numpy as np
+
+    monkeypatch.chdir(tmp_path)
+    scene = read_scene(with_angles(tmp_path))
+    chain = scene_chain(scene, scene.molecule_list[0])
+    assert chain.angle_set == "uniform"
+    np.testing.assert_allclose(chain.ground[:, 0], 2.0 * np.pi / 10.5)
+
+
+def test_results_are_kept_only_while_the_parameter_file_is_the_same(tmp_path):
+    def key(scene):
+        return run_key(scene, Level.QUICK, 0)
+
+    one = key(read_scene(with_angles(tmp_path)))
+    again = key(read_scene(with_angles(tmp_path)))
+    other = key(read_scene(with_angles(tmp_path, 10.4)))
+    assert one == again
+    assert one != other
+
+
+def test_a_run_with_a_parameter_file_from_another_folder(tmp_path, monkeypatch, capsys):
+    scene = with_angles(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    arguments = ["validate", str(scene), "-o", "out", "--only", "wanted.energy", "--quiet"]
+    assert main(arguments) == 0, capsys.readouterr()
+
+
+def test_stiffnesses_of_a_parameter_file_leave_no_room_for_a_twist_ratio(tmp_path):
+    import tomllib
+
+    parent = tomllib.loads((data_directory() / "angle_sets" / "trifonov.toml").read_text())
+    lines = ['name = "stiff"', 'citation = "an example"']
+    for step, angles in parent["steps"].items():
+        lines += [f"[steps.{step}]"] + [f"{key} = {value}" for key, value in angles.items()]
+        lines.append("stiffness = [[1.2, 0, 0], [0, 1.1, 0], [0, 0, 0.9]]")
+    (tmp_path / "stiff.toml").write_text("\n".join(lines))
+    scene = scene_of(tmp_path, changed("twist_ratios = [1.5]", 'angles = ["stiff.toml"]'))
+    assert scene_chain(scene, scene.molecule_list[0]).stiffness[0, 1, 1] == 1.1
+    with pytest.raises(InputError, match=r"line 7.*leave out twist_ratios"):
+        scene_of(
+            tmp_path,
+            changed("twist_ratios = [1.5]", 'twist_ratios = [1.5]\nangles = ["stiff.toml"]'),
+        )

@@ -43,15 +43,17 @@ def scene_chain(
     model = scene.model
     angles = model.angles[0] if angles is None else angles
     ratio = model.twist_ratios[0] if ratio is None else ratio
+    file = scene.angle_file(angles)
+    twisted = angles == "trifonov2" if file is None else file.has_a_tract_twist
     return _chain(
         molecule.name,
         molecule.sequence.letters,
         molecule.a_tract_regions,
-        angles,
-        ratio,
+        angles if file is None else file.path,
+        None if file is not None and file.has_stiffness else ratio,
         model.persistence_length_A,
         model.rise_A,
-        model.a_tracts if angles == "trifonov2" else "auto",
+        model.a_tracts if twisted else "auto",
     )
 
 

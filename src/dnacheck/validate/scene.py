@@ -25,6 +25,8 @@ but sums of some hundred terms round at 1e-13 and the promise should have room."
 FINEST_LN_J = 0.002
 """Absolute; the exact-closure sampler reaches 0.01 in 0.2 s, so this is already 25 times the work
 per molecule, and every halving is four times more."""
+FINEST_THERMAL_ENERGY = 1e-3
+"""Relative; errors of 0.01 on two ln J leave 0.14 RT of some 240."""
 MOST_BASE_PAIRS = 20_000
 
 
@@ -95,6 +97,20 @@ class Checks(_Part):
     against_paper: bool = False
 
 
+class AngleFile(_Part):
+    """A parameter file that a scene names: where it lies, what it holds."""
+
+    name: str
+    path: str
+    sha256: str
+    has_stiffness: bool
+    has_a_tract_twist: bool
+
+
+FILLED_IN = ("source", "resolved", "angle_files")
+"""Fields of a scene that its reader fills in; a file must not hold them."""
+
+
 class Scene(_Part):
     """A validated scene; ``source`` is the file it came from."""
 
@@ -107,6 +123,7 @@ class Scene(_Part):
     checks: Checks = Checks()
     source: str = ""
     resolved: tuple[tuple[str, str, tuple[Region, ...] | None], ...] = ()
+    angle_files: tuple[AngleFile, ...] = ()
 
     @cached_property
     def molecule_list(self) -> tuple[Molecule, ...]:
@@ -121,10 +138,16 @@ class Scene(_Part):
         """Names of the wanted quantities."""
         return tuple(name for name, value in self.wanted if value is not None)
 
+    def angle_file(self, angles: str) -> AngleFile | None:
+        """The parameter file behind a name in [model] angles; None for an embedded set."""
+        return next((file for file in self.angle_files if file.name == angles), None)
+
     @property
     def digest(self) -> str:
         """SHA-256 of everything in the scene that a result can depend on."""
         content = self.model_dump(mode="json", exclude={"source"})
+        for file in content["angle_files"]:
+            del file["path"]  # the content counts, wherever it lies
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import hashlib
 import math
 import tomllib
 from collections.abc import Callable, Iterator
@@ -17,9 +18,12 @@ from dnacheck.model.parameters import EMBEDDED_SETS, load_angle_set
 from dnacheck.model.sequence import parse_sequence
 from dnacheck.numerics.outcome import InputError
 from dnacheck.validate.scene import (
+    FILLED_IN,
     FINEST_ENERGY,
     FINEST_LN_J,
+    FINEST_THERMAL_ENERGY,
     MOST_BASE_PAIRS,
+    AngleFile,
     RandomMolecules,
     Scene,
     scenes_directory,
@@ -75,13 +79,14 @@ class _Reader:
         return InputError(f"scene '{self.path}'{where}: {message}")
 
     def scene(self, table: dict[str, Any]) -> Scene:
-        for reserved in ("source", "resolved"):
+        for reserved in FILLED_IN:
             if reserved in table:
                 raise self.fail(f"unknown key '{reserved}'; remove it", reserved)
         try:
             scene = Scene.model_validate({**table, "source": str(self.path)})
         except ValidationError as error:
             raise self.explain(error.errors()[0]) from None
+        scene = scene.model_copy(update={"angle_files": self.angle_files(scene)})
         self.possible(scene)
         resolved = tuple(
             (molecule.name, molecule.sequence.letters, molecule.a_tract_regions)
@@ -115,13 +120,37 @@ class _Reader:
         shown = f", not {given!r}" if isinstance(given, str | int | float | bool | list) else ""
         return self.fail(f"'{dotted}': {message}{shown}", *place)
 
-    def possible(self, scene: Scene) -> None:
-        """Refuse what no model of ours can give."""
-        for index, angles in enumerate(scene.model.angles):
+    def angle_files(self, scene: Scene) -> tuple[AngleFile, ...]:
+        """The parameter files that the scene names, each read once to see that it is one."""
+        files = []
+        for index, name in enumerate(scene.model.angles):
+            if name in EMBEDDED_SETS:
+                continue
+            path = self._beside(name).resolve()
             try:
-                load_angle_set(str(self._beside(angles)) if _is_file(angles) else angles)
+                table = load_angle_set(str(path))
             except InputError as error:
                 raise self.fail(str(error), "model", "angles", index) from None
+            has_stiffness = table.stiffness is not None
+            if has_stiffness and "twist_ratios" in scene.model.model_fields_set:
+                raise self.fail(
+                    f"'{name}' has stiffnesses of its own; leave out twist_ratios",
+                    "model",
+                    "twist_ratios",
+                )
+            files.append(
+                AngleFile(
+                    name=name,
+                    path=str(path),
+                    sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
+                    has_stiffness=has_stiffness,
+                    has_a_tract_twist=table.a_tract_twist is not None,
+                )
+            )
+        return tuple(files)
+
+    def possible(self, scene: Scene) -> None:
+        """Refuse what no model of ours can give."""
         rod = scene.continuum
         if 2 * (rod.filter_width - 1) > rod.padding:
             raise self.fail(
@@ -151,6 +180,13 @@ class _Reader:
                 f"wait for; ask for {FINEST_LN_J:g} or more",
                 "wanted",
                 "ln_J",
+            )
+        if wanted.thermal_energy is not None and wanted.thermal_energy < FINEST_THERMAL_ENERGY:
+            raise self.fail(
+                f"a relative accuracy of {wanted.thermal_energy:g} of a mean energy needs more "
+                f"sampling than a report can wait for; ask for {FINEST_THERMAL_ENERGY:g} or more",
+                "wanted",
+                "thermal_energy",
             )
         if isinstance(scene.checks.groups, list):
             from dnacheck.validate.registry import groups
@@ -262,10 +298,6 @@ def random_molecules(wish: RandomMolecules) -> Iterator[Molecule]:
         yield Molecule(parse_sequence(letters, f"random{number:0{digits}d}"))
 
 
-def _is_file(angles: str) -> bool:
-    return angles not in EMBEDDED_SETS
-
-
 def _mend(wrong: str, known: list[str]) -> str:
     close = difflib.get_close_matches(wrong, known, n=1)
     return f"did you mean '{close[0]}'?" if close else f"known are {', '.join(known)}"
@@ -284,6 +316,4 @@ def _known_keys(place: tuple[str | int, ...]) -> list[str]:
             return []
         candidates = [field.annotation, *getattr(field.annotation, "__args__", ())]
         model = next((item for item in candidates if hasattr(item, "model_fields")), None)
-    return [
-        name for name in getattr(model, "model_fields", {}) if name not in ("source", "resolved")
-    ]
+    return [name for name in getattr(model, "model_fields", {}) if name not in FILLED_IN]
