@@ -110,6 +110,13 @@ SABOTAGE = {
         ("quick", "table2"),
         "table2.continuum",
     ),
+    "an acceptance rule": (
+        "dnacheck/jfactor/metropolis_kernels.py",
+        "if uniform(state) < ratio * math.exp(-change):",
+        "if uniform(state) < ratio * math.exp(-0.9 * change):",
+        ("default", "jfactor.acceptance"),
+        "jfactor.acceptance",
+    ),
     "a closure tolerance": (
         "dnacheck/ring/discrete.py",
         "tolerance: float = 1e-10",
@@ -145,12 +152,17 @@ def test_sabotage_is_noticed_by_the_right_check(fault, tmp_path):
     print(f"{fault}: {len(failed)} checks failed, {', '.join(sorted(named))}")
 
 
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report")
+    code, output = validate(folder)
+    assert code == 0, output
+    return folder / "report.html"
+
+
 @pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
 @pytest.mark.parametrize("width", [390, 1280])
-def test_report_in_a_browser(width, tmp_path):
-    code, output = validate(tmp_path / "out", "quick")
-    assert code == 0, output
-    page = tmp_path / "out" / "report.html"
+def test_report_in_a_browser(width, page, tmp_path):
     assert page.stat().st_size < 8e6
     # the page tells about itself: how wide it is, and every error and request it saw
     probe = (

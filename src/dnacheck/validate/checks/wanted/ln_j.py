@@ -153,7 +153,9 @@ def _table(context: Context, rows: Sequence[dict[str, Any]]) -> Table:
 def _methods(choices: Sequence[Choice], accuracy: float) -> Table:
     """How often each method was tried, and with what outcome."""
     rows = []
-    for method in _METHODS:
+    seen = [attempt.method for choice in choices for attempt in choice.attempts]
+    # in the order in which they were tried, which is that of their cost
+    for method in dict.fromkeys([*seen, *_METHODS]):
         tried = [a for choice in choices for a in choice.attempts if a.method == method]
         if not tried:
             rows.append({"method": method, "tried": 0, "decision": "left out: dearer, not needed"})
