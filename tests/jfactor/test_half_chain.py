@@ -238,6 +238,11 @@ def test_no_pair_and_no_ring_are_errors():
         half_chain(empty)
 
 
+def test_fewer_halves_than_tilts_are_refused():
+    with pytest.raises(InputError, match="tilts; draw"):
+        half_chain(molecule_chain("09T15"), HalfChainOptions(halves=160, batches=16), 0)
+
+
 @pytest.mark.parametrize(
     "bad",
     [

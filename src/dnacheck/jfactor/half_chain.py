@@ -261,6 +261,8 @@ def half_chain_estimate(
 
     Raises
     ------
+    InputError
+        Fewer halves in a batch than two for each tilt.
     SolveError
         No stable ring, or no pair of halves met.
     """
@@ -268,6 +270,11 @@ def half_chain_estimate(
     joint = chain.n_steps // 2
     tilts = ring_tilts(search, joint)
     per_batch = options.halves // options.batches
+    if options.tilted and per_batch < 2 * len(tilts):
+        raise InputError(
+            f"half chains of {chain.name}: {options.halves} halves are too few for {len(tilts)} "
+            f"tilts; draw {2 * len(tilts) * options.batches} or more"
+        )
     streams = rng.spawn(2 * options.batches)
     sides = [
         _Sampler(chain, tilts, steps, options.tilted)

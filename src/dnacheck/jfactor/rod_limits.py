@@ -7,7 +7,8 @@ a length) has, with kappa = P/L,
 * ends that meet with their tangents aligned, twist averaged over:
   J = (4 pi^3 b^3 / L^6) exp(-pi^2 b / L + 0.514 L / b), b = 2P
 
-(Shimada & Yamakawa, Macromolecules 17, 689 (1984); good to a few per cent up to about L = 4 P). Directions count against a uniform distribution.
+(Shimada & Yamakawa, Macromolecules 17, 689 (1984); good to a few per cent up to about L = 4 P).
+Directions count against a uniform distribution.
 
 Twist enters as a sum over links of a Gaussian in the excess twist 2 pi (link - relaxed turns),
 whose variance L/C ignores that bending and twist are coupled through the writhe. To lowest order
