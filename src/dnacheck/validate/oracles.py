@@ -13,13 +13,18 @@ FOLDER = Path(__file__).resolve().parents[3] / "validation" / "oracles"
 
 def oracle_exists(name: str) -> bool:
     """Whether the oracle is at hand; an installed wheel has none."""
-    return (FOLDER / f"{name}.py").is_file()
+    return _path(name).is_file()
+
+
+def _path(name: str) -> Path:
+    package = FOLDER / name / "__init__.py"
+    return package if package.is_file() else FOLDER / f"{name}.py"
 
 
 @cache
 def load_oracle(name: str) -> ModuleType:
-    """The oracle's module, by file name."""
-    path = FOLDER / f"{name}.py"
+    """The oracle's module, by the name of its file or folder."""
+    path = _path(name)
     spec = importlib.util.spec_from_file_location(f"dnacheck_oracle_{name}", path)
     if spec is None or spec.loader is None:
         raise FileNotFoundError(path)

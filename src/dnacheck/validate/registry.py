@@ -27,6 +27,7 @@ GROUP_MODULES = (
     "sweeps",
     "jfactors",
     "bead_chain",
+    "speed",
     "hard",
 )
 """Modules of ``dnacheck.validate.checks``, in the order of the report. Each defines ``GROUP``."""
