@@ -103,9 +103,9 @@ def test_methods_are_compared_only_where_the_scene_asks(tmp_path):
         for step in make_plan(scene_of(tmp_path, "ln_J = 0.05"), Level.FULL).steps
         if not step.run
     }
-    assert "compare methods" in left_out["jfactor.half_chain"]
+    assert "compare methods" in left_out["jfactor.pairwise"]
     asked = chosen(scene_of(tmp_path, "ln_J = 0.05", "[checks]\ncompare_methods = true\n"))
-    assert {"jfactor.half_chain", "wanted.ln_J"} <= asked
+    assert {"jfactor.pairwise", "wanted.ln_J"} <= asked
 
 
 def test_mean_energy_by_equipartition_where_it_is_enough(tmp_path):
