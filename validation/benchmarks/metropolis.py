@@ -14,6 +14,7 @@ import time
 
 import numpy as np
 
+from dnacheck.jfactor.closure_sampling import ClosureOptions, sample_closure
 from dnacheck.jfactor.half_chain import HalfChainOptions, half_chain
 from dnacheck.jfactor.metropolis import ClosedRingOptions, closed_ring_ensemble
 from dnacheck.jfactor.umbrella import UmbrellaOptions, umbrella_estimate
@@ -22,6 +23,7 @@ from dnacheck.model.molecules import embedded
 from dnacheck.ring.search import find_rings
 
 SEED = 1
+CALIBRATION_RUNS = 24
 BEST = ("09T15", "08T15", "08A17")
 
 
@@ -62,6 +64,31 @@ def short() -> None:
     _umbrella(UmbrellaOptions(samples=400, threads=2))
 
 
+def calibration() -> None:
+    """Stated errors of short runs of many seeds against their scatter about exact closure."""
+    print(f"\nMetropolis with MBAR over {CALIBRATION_RUNS} seeds, 4 copies of 100 records")
+    options = UmbrellaOptions(samples=100, burn_in=50, thinning=2, threads=2)
+    for name in ("09T15", "08A17"):
+        search = find_rings(build_chain(embedded(name)))
+        exact = sample_closure(search, ClosureOptions(tolerance=0.005), SEED).minus_lnJ
+        runs = [
+            umbrella_estimate(search, options, np.random.default_rng(1000 + seed))
+            for seed in range(CALIBRATION_RUNS)
+        ]
+        off = np.array([-run.log_j - exact for run in runs])
+        stated = np.array([run.stderr for run in runs])
+        mbar = np.array([run.mbar_error for run in runs])
+        copies = np.array([run.copies_error for run in runs])
+        print(
+            f"{name}: mean difference {off.mean():+.3f} +- {off.std(ddof=1) / len(off) ** 0.5:.3f},"
+            f" scatter {off.std(ddof=1):.3f}; stated error {np.sqrt(np.mean(stated**2)):.3f} (MBAR "
+            f"{np.sqrt(np.mean(mbar**2)):.3f}, copies {np.sqrt(np.mean(copies**2)):.3f}); rms "
+            f"difference over stated error {np.sqrt(np.mean((off / stated) ** 2)):.2f}, "
+            f"{100 * np.mean(np.abs(off) < stated):.0f} % within one",
+            flush=True,
+        )
+
+
 def ring() -> None:
     """Mean energy and shape of closed rings by each kind of move."""
     print("\nClosed rings: energy, expected from equipartition, writhe, radius of gyration in Å")
@@ -81,7 +108,7 @@ def ring() -> None:
         )
 
 
-TABLES = {"ring": ring, "short": short, "long": long}
+TABLES = {"ring": ring, "calibration": calibration, "short": short, "long": long}
 
 
 def main(names: list[str]) -> None:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from dnacheck.validate.checks.jfactors.acceptance import acceptance
-from dnacheck.validate.checks.jfactors.methods import half_chain, laplace, metropolis
+from dnacheck.validate.checks.jfactors.methods import laplace, pairwise
 from dnacheck.validate.checks.jfactors.table3 import shifts, table3
 from dnacheck.validate.registry import Check, Findings, Group
 from dnacheck.validate.scene import Scene
@@ -15,51 +15,53 @@ from dnacheck.validate.sections import Block, Column, Table
 
 def assemble(findings: Mapping[str, Findings]) -> Sequence[Block]:
     """One table of all methods, then what each check has to show."""
-    methods = {
-        block.id: {row["name"]: row for row in block.rows}
-        for found in findings.values()
-        for block in found.blocks
-        if isinstance(block, Table) and block.id in ("closure", "half-chain", "metropolis")
-    }
-    others = [
-        block
-        for found in findings.values()
-        for block in found.blocks
-        if not (isinstance(block, Table) and block.id in methods)
-    ]
-    if "closure" not in methods:
+    merged: dict[str, dict[str, Any]] = {}
+    others: list[Block] = []
+    for found in findings.values():
+        for block in found.blocks:
+            if isinstance(block, Table) and block.id in ("closure", "methods"):
+                for row in block.rows:
+                    cells = dict(row)
+                    if block.id == "methods":
+                        # The same method ran in both checks; the sharper run is shown.
+                        for shared in ("laplace", "register-laplace", "closure"):
+                            cells.pop(shared, None)
+                    merged.setdefault(row["name"], {}).update(cells)
+            else:
+                others.append(block)
+    if not merged:
         return others
-    rows = []
-    for name, best in methods["closure"].items():
-        row = {"name": name, **best}
-        row["laplace_bias"] = None if best["laplace"] is None else best["register_bias"]
-        for method in ("half-chain", "metropolis"):
-            found = methods.get(method, {}).get(name)
-            if found:
-                row[method] = found["minus_lnJ"]
-                row[f"{method}-error"] = math.hypot(found["stderr"], found["bias"] or 0.0)
-        rows.append(row)
     columns = [
         Column("name", "Molecule"),
         Column("J", "J", "mol/L", ".2e"),
         Column("minus_lnJ", "−ln J", "", ".3f", "", "Exact closure"),
         Column("stderr", "±", "", ".3f", "", "Exact closure"),
-        Column("half-chain", "−ln J", "", ".3f", "", "Half chains"),
-        Column("half-chain-error", "±", "", ".3f", "", "Half chains"),
+        Column("corrected", "−ln J", "", ".3f", "", "Laplace + first term"),
+        Column("corrected_error", "±", "", ".3f", "", "Laplace + first term"),
+        Column("half-chain", "−ln J", "", ".2f", "", "Half chains"),
+        Column("half-chain-error", "±", "", ".2f", "", "Half chains"),
         Column("metropolis", "−ln J", "", ".2f", "", "Metropolis, MBAR"),
         Column("metropolis-error", "±", "", ".2f", "", "Metropolis, MBAR"),
+        Column("sigmas", "any two differ by", "s.e.", ".1f"),
         Column("laplace", "plain", "", ".3f", "", "Laplace"),
         Column("register", "register", "", ".3f", "", "Laplace"),
         Column("register_bias", "its bias", "", "+.2f", "", "Laplace"),
     ]
+    if any("half-chain-plain" in row for row in merged.values()):
+        columns[8:8] = [
+            Column("half-chain-plain", "plain", "", ".2f", "", "Half chains"),
+            Column("half-chain-plain-error", "±", "", ".2f", "", "Half chains"),
+        ]
     table = Table(
         "methods",
-        "J factors by five methods",
+        "J factors by all methods",
         columns,
-        rows,
-        "−ln J, J in mol/L, nothing fitted. ± are standard errors with bias bounds added in "
-        "quadrature; Laplace has none of its own, its bias is measured against exact closure.",
-        summary=len(rows) <= 30,
+        list(merged.values()),
+        "−ln J, J in mol/L, nothing fitted. ± are standard errors, and for Laplace with its first "
+        "anharmonic term the estimated next term too. Laplace has no error of its own; its bias "
+        "is measured against exact closure. Any two of the methods with errors differ by at most "
+        "so many combined standard errors.",
+        summary=len(merged) <= 30,
     )
     return [table, *others]
 
@@ -79,10 +81,8 @@ GROUP = Group(
     (
         Check("jfactor.laplace", "exact-closure sampling and Laplace", laplace, 4.0, _NEEDS,
               requires=("dnacheck.jfactor.closure_sampling",)),
-        Check("jfactor.half_chain", "tilted half chains", half_chain, 16.0, _NEEDS,
-              requires=("dnacheck.jfactor.half_chain",)),
-        Check("jfactor.metropolis", "Metropolis with MBAR, best cyclizers", metropolis, 40.0,
-              _NEEDS, requires=("dnacheck.jfactor.umbrella",)),
+        Check("jfactor.pairwise", "every two methods, half chains and Metropolis too", pairwise,
+              45.0, _NEEDS, requires=("dnacheck.jfactor.compare",)),
         Check("jfactor.acceptance", "Metropolis moves keep their distribution", acceptance, 6.0,
               _NEEDS, requires=("dnacheck.jfactor.metropolis_kernels",)),
         Check("jfactor.table3", "Table III", table3, 6.0, _NEEDS, applies=_paper,
