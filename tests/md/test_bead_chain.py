@@ -89,14 +89,16 @@ def test_midstep_form(coupled):
 
 
 @pytest.mark.md
-def test_measure_term_is_the_log_volume(chain, energy):
+@pytest.mark.parametrize("form", ["wedge", "midstep"])
+def test_measure_term_is_the_log_volume(form):
     from dnacheck.md.geometry import log_volume_elements
 
+    chain = replace(ring_chain(12), step_form=form)
     beads = shaken_ring(chain)
-    flat = BeadEnergy(BeadChain(chain, measure="angles"))
-    angles = step_angles(frames_of_beads(beads, True)[1])
-    difference = flat.elastic_energy_RT(beads) - energy.elastic_energy_RT(beads)
-    assert difference == pytest.approx(float(log_volume_elements(angles)), rel=1e-9)
+    curved = BeadEnergy(BeadChain(chain)).elastic_energy_RT(beads)
+    flat = BeadEnergy(BeadChain(chain, measure="angles")).elastic_energy_RT(beads)
+    angles = step_angles(frames_of_beads(beads, True)[1], form)
+    assert flat - curved == pytest.approx(float(log_volume_elements(angles, form)), rel=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["sign", "stiffness"])

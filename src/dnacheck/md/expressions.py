@@ -39,18 +39,22 @@ cos_p = ts*sqrt(ss*qq - sq*sq);
 """
 
 # The symmetrised step R_tau/2 R_theta/2 R_phi R_theta/2 R_tau/2 has a quaternion (x, y, z, w) with
-# tan(tau/2) = z/w, tan(theta/2) = -x/hypot(z, w), sin(phi/2) = y; the names below are 4w times
-# those. w is positive for twists within 180 degrees.
+# tan(theta/2) = -x/hypot(z, w) and sin(phi/2) = y; hypot(z, w) is the cosine of half the bend.
+# qx, qy and qw below are 4w times x, y and w, so qw = 4w^2. The twist is that of parallel
+# transport; its sine and cosine carry a common factor. Every name is used as seldom as can be,
+# because OpenMM differentiates the expression with all names written out.
 _MIDSTEP = """
-dtau = 2*atan2(qz, qw) - tau_0;
-dtheta = theta - theta_0;
-dphi = phi - phi_0;
-theta = 2*atan2(-qx, sqrt(qz^2 + qw^2));
-phi = 2*atan2(qy, sqrt(qx^2 + qz^2 + qw^2));
+dtau = atan2(sin_t, cos_t) - tau_0;
+dtheta = 2*atan2(-qx/root, half) - theta_0;
+dphi = 2*asin(y) - phi_0;
+y = qy/root;
+root = 2*sqrt(qw);
+half = sqrt(0.5 + 0.5*ts/(lt*ls));
+qw = 1 + ts/(lt*ls) + cos_t/(ln*ld);
 qx = tsq/(lt*ld) - tps/(ln*ls);
 qy = (ps*tt - tp*ts)/(lt*ln*ls) - (tq*ss - ts*sq)/(lt*ls*ld);
-qz = ((ss*tpq - sq*tps)/ls + (tp*tsq - tt*psq)/lt)/(ln*ld);
-qw = 1 + ts/(lt*ls) + ((tt*(ss*pq - sq*ps) - tp*(ss*tq - sq*ts))/(lt*ls) + ts*pq - tq*ps)/(ln*ld);
+sin_t = (ss*tpq - sq*tps)/ls + (tp*tsq - tt*psq)/lt;
+cos_t = (tt*(ss*pq - sq*ps) - tp*(ss*tq - sq*ts))/(lt*ls) + ts*pq - tq*ps;
 lt = sqrt(tt); ls = sqrt(ss); ln = sqrt(tt*pp - tp*tp); ld = sqrt(ss*qq - sq*sq);
 tps = tx*nx + ty*ny + tz*nz;
 tpq = tx*(py*gz - pz*gy) + ty*(pz*gx - px*gz) + tz*(px*gy - py*gx);
@@ -84,7 +88,8 @@ gx = x5 - x2; gy = y5 - y2; gz = z5 - z2
 # Logarithm of the rotation group's volume element in the step angles; see docs/md.md.
 _LOG_VOLUME = {
     "wedge": "log(cos(theta))",
-    "midstep": "log(cos(0.5*theta)) + 2*log(cos(0.5*phi))",
+    # cos(theta/2) cos(phi/2) is the cosine of half the bend.
+    "midstep": "log(half) + 0.5*log(1 - y^2)",
 }
 
 
