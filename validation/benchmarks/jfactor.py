@@ -20,6 +20,7 @@ from dnacheck.jfactor.closure_sampling import ClosureOptions, ClosureSampler
 from dnacheck.jfactor.laplace import laplace
 from dnacheck.jfactor.register import RegisterProfile, register_profile
 from dnacheck.jfactor.result import JFactor
+from dnacheck.jfactor.speed import LONG, molecules, study, warm_up
 from dnacheck.model.chain import Chain, build_chain, uniform_stiffness
 from dnacheck.model.molecules import embedded, embedded_names
 from dnacheck.model.sequence import parse_sequence
@@ -148,12 +149,12 @@ def homopolymer() -> None:
 def calibration() -> None:
     """Share of seeded runs whose one-sigma interval holds the long-run value."""
     print(f"\nCalibration over {CALIBRATION_RUNS} seeded runs of 320 draws")
-    molecules = [
+    chains = [
         ("11T15", build_chain(embedded("11T15"))),
         ("straight 150", straight(150)),
-        ("random 386 bp, ratio 0.6", _soft()),
+        ("random 386 bp, ratio 0.6", molecules()["hard: random, 386 bp"]),
     ]
-    for name, chain in molecules:
+    for name, chain in chains:
         profile = register_profile(find_rings(chain))
         first = ClosureSampler(profile, ClosureOptions(tolerance=10.0), SEED).sample()
         # A tenth of one run's error: the long-run value then counts as known.
@@ -166,25 +167,21 @@ def calibration() -> None:
         print(f"{name}: {100.0 * inside / CALIBRATION_RUNS:.1f} % inside one standard error")
 
 
-def _soft() -> Chain:
-    letters = "".join(np.random.default_rng(7).choice(list("ACGT"), 386))
-    return build_chain(parse_sequence(letters, "soft"), twist_ratio=0.6)
-
-
 def speed() -> None:
-    """Standard error against time for an easy, a middling and a hard molecule."""
-    print("\nStandard error against time (one core), exact closure")
-    for name, chain in (
-        ("08T15 (easy)", build_chain(embedded("08T15"))),
-        ("09T09 (middling)", build_chain(embedded("09T09"))),
-        ("random 386 bp, ratio 0.6 (hard)", _soft()),
-    ):
-        for tolerance in (0.05, 0.02, 0.01, 0.005):
-            run = sampled(chain, tolerance)
+    """Error against time for an easy, a middling and a hard molecule, every method."""
+    print("\nError of ln J against processor time, search included; Laplace's error is its bias")
+    warm_up()
+    for name, chain in molecules().items():
+        found = study(name, chain, LONG, SEED)
+        print(f"{name}: exact closure {found.reference:.3f} +- {found.reference_error:.3f}")
+        for point in found.points:
             print(
-                f"{name}: s.e. {run.result.stderr:.4f} in {run.processor:.3f} cpu s "
-                f"({run.wall:.3f} wall), {run.result.samples} draws"
+                f"  {point.method:17s} {point.size:18s} {point.seconds:8.3f} s  error "
+                f"{point.error:.4f}  off by {point.bias:+.3f}",
+                flush=True,
             )
+        for line in found.failed:
+            print(f"  none: {line}")
 
 
 TABLES = {

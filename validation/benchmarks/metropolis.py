@@ -23,7 +23,7 @@ from dnacheck.model.molecules import embedded
 from dnacheck.ring.search import find_rings
 
 SEED = 1
-CALIBRATION_RUNS = 24
+CALIBRATION_RUNS = 16
 BEST = ("09T15", "08T15", "08A17")
 
 

@@ -8,6 +8,7 @@ from typing import Any
 from dnacheck.validate.checks.jfactors.acceptance import acceptance
 from dnacheck.validate.checks.jfactors.methods import laplace, pairwise
 from dnacheck.validate.checks.jfactors.table3 import shifts, table3
+from dnacheck.validate.checks.jfactors.timing import speed
 from dnacheck.validate.registry import Check, Findings, Group
 from dnacheck.validate.scene import Scene
 from dnacheck.validate.sections import Block, Column, Table
@@ -89,6 +90,8 @@ GROUP = Group(
               requires=("dnacheck.jfactor.table3",)),
         Check("jfactor.shifts", "entropy shifts (Figures 17 to 19)", shifts, 5.0, _NEEDS,
               applies=_paper, requires=("dnacheck.jfactor.table3",)),
+        Check("jfactor.speed", "error against time", speed, 20.0, _NEEDS, applies=_paper,
+              requires=("dnacheck.jfactor.speed",)),
     ),
     assemble,
 )  # fmt: skip
