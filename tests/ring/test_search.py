@@ -50,6 +50,18 @@ def test_brute_force_finds_nothing_lower():
         assert brute_force(chain, registers=8).lowest.energy >= lowest * (1.0 - 1e-9)
 
 
+@pytest.mark.parametrize("unit", ["A", "AT", "AAC"])
+def test_repeats_whose_register_is_all_but_free(unit):
+    """The energy of a short repeat hardly knows its register; some registers are still worse."""
+    for n in range(10, 73, 4 if len(unit) > 1 else 1):
+        letters = (unit * n)[:n]
+        found = find_rings(build_chain(Sequence(f"{unit}{n}", letters), a_tracts="none"))
+        assert found.failed_starts == 0
+        assert found.lowest.residual < 1e-10
+        around = brute_force(found.chain, 1, 6)
+        assert around.lowest.energy >= found.lowest.energy * (1.0 - 1e-9)
+
+
 @pytest.mark.slow
 def test_a_thousand_random_sequences_end_in_stable_minima():
     rng = np.random.default_rng(13)

@@ -38,6 +38,10 @@ N_FIGURES = 8
 # Below this curvature along a rotation of the frames, relative to that of the energy of a bent
 # circle, a mode costs nothing that round-off could tell from zero.
 _FLAT = 1e-7
+# Smallest shift, and what it grows from is at most so many times the residual: near a soft register
+# a larger one would make the iteration linear.
+_LEAST_SHIFT = 1e-10
+_SHIFT_OF_RESIDUAL = 10.0
 _MOST_ESCAPES = 4
 _ESCAPE_TURN = 0.3
 
@@ -112,7 +116,7 @@ def newton(
     # Energy of a bent circle over its length: the scale on which rolling costs energy.
     unit = 2.0 * math.pi * math.pi * mean_bend / n
     flat = _FLAT * unit
-    shift = 0.0
+    shift, first = 0.0, 0.0
     escapes = 0
 
     state[0][:] = angles
@@ -158,7 +162,8 @@ def newton(
         if iteration == max_iterations:
             break
 
-        shift = max(shift if shift > 1e-3 * unit else 0.0, flat)
+        shift = max(shift if shift > 1e-3 * first else 0.0, _LEAST_SHIFT * unit)
+        first = min(FIRST_SHIFT * unit, _SHIFT_OF_RESIDUAL * stationarity)
         turn = math.inf
         for attempt in range(MOST_SHIFTS):
             negatives, _, _ = solve_kkt(
@@ -169,9 +174,9 @@ def newton(
                 turn = accumulated_turn(state[3], step)
                 if turn <= 2.0 * turn_cap or not minima_only or attempt >= 6:
                     break
-                shift = 2.0 * (shift + FIRST_SHIFT * unit)
+                shift = 2.0 * (shift + first)
             else:
-                shift = max(FIRST_SHIFT * unit, 4.0 * shift)
+                shift = max(first, 4.0 * shift)
         if not math.isfinite(turn):
             code = SINGULAR
             break
@@ -187,19 +192,16 @@ def newton(
             ground,
             stiffness,
             form,
-            factors,
-            small,
         )
         if fraction == 0.0:
             code = STEP_LIMIT
             break
         if fraction < 0.3 and turn <= 2.0 * turn_cap:
-            shift = max(FIRST_SHIFT * unit, 4.0 * shift)
+            shift = max(first, 4.0 * shift)
         elif ratio > 0.8:
             shift *= 0.25
-        part = 1.0 if fraction > 0.1 else fraction
         for i in range(6):
-            multipliers[i] += part * (target[i] - multipliers[i])
+            multipliers[i] += fraction * (target[i] - multipliers[i])
         state, trial = trial, state
     angles[:] = state[0]
     return code

@@ -20,10 +20,10 @@ from dnacheck.ring.closure_kernels import (
     linearise,
 )
 from dnacheck.ring.schur_kernels import solve_small
-from dnacheck.ring.sweep_kernels import back_substitute
 
 # Frames that turn by more than this (rad) are turned; the angles of smaller steps are added.
-_TURN_FRAMES = 0.15
+# Rolling is a rotation of frames, so even small steps along a soft register gain by it.
+_TURN_FRAMES = 1e-5
 _MOST_HALVINGS = 30
 
 
@@ -147,6 +147,41 @@ def move(state: Any, step: Any, fraction: float, turn: float, form: int, out: An
                 out[s, j] = angles[s, j] + fraction * step[s, j]
 
 
+@njit(cache=True, nogil=True, error_model="numpy")
+def restore(state: Any, stiffness: Any, defect: Any, mend: Any) -> bool:
+    """Change (N, 3) that undoes a closure ``defect`` (6,) to first order, soft modes left alone.
+
+    It is the least change in the metric of the diagonal of the stiffness; the Hessian as metric
+    would send a soft register far away. False if closure is singular.
+    """
+    _, centres, _, axes, _, _, _ = state
+    n = axes.shape[0]
+    metric = np.zeros((6, 7))
+    column = np.empty(6)
+    weights = np.empty(6)
+    for round_ in range(2):
+        for s in range(n):
+            x = centres[n, 0] - centres[s + 1, 0]
+            y = centres[n, 1] - centres[s + 1, 1]
+            z = centres[n, 2] - centres[s + 1, 2]
+            for j in range(3):
+                a0, a1, a2 = axes[s, j, 0], axes[s, j, 1], axes[s, j, 2]
+                column[0], column[1], column[2] = a1 * z - a2 * y, a2 * x - a0 * z, a0 * y - a1 * x
+                column[3], column[4], column[5] = a0, a1, a2
+                soft = 1.0 / stiffness[s, j, j]
+                if round_ == 0:
+                    for i in range(6):
+                        for k in range(6):
+                            metric[i, k] += soft * column[i] * column[k]
+                else:
+                    mend[s, j] = 0.0
+                    for i in range(6):
+                        mend[s, j] -= soft * column[i] * weights[i]
+        if round_ == 0 and solve_small(metric, defect, float(n), weights)[0] < 0:
+            return False
+    return True
+
+
 @njit(cache=True, nogil=True)
 def line_search(
     state: Any,
@@ -160,14 +195,12 @@ def line_search(
     ground: Any,
     stiffness: Any,
     form: int,
-    factors: Any,
-    small: Any,
 ) -> tuple[float, float, float]:
     """Find a fraction of a step that improves, and leave the state there in ``trial``.
 
     The merit is energy + weight * closure residual, an exact penalty. Where the curvature of
-    closure spoils a trial, the factors at hand send it back to what the linearised closure
-    promised, once.
+    closure spoils a trial, :func:`restore` sends it back to what the linearised closure promised,
+    once.
 
     Returns
     -------
@@ -180,7 +213,6 @@ def line_search(
     length = float(n)
     mend = np.empty((n, 3))
     curved = np.empty(6)
-    blend = np.empty(6)
     slope = 0.0
     for s in range(n):
         for j in range(3):
@@ -209,7 +241,7 @@ def line_search(
             if fraction == 1.0 and attempt == 0 and not accepted:
                 stationarity, worst = residuals(trial, target)
                 # Below the noise of the energy only the residual can judge a step.
-                bound = 2.0 if turn < 1e-6 else 0.5
+                bound = 2.0 if turn < 1e-6 or descent < 10.0 * noise else 0.5
                 accepted = max(stationarity, worst) <= bound * residual
                 if accepted:
                     break
@@ -218,9 +250,8 @@ def line_search(
                 break
             for i in range(6):
                 curved[i] = trial[6][i] - (1.0 - fraction) * closure[i]
-            if not trial_size < 0.5 + size or solve_small(small, curved, length, blend)[0] < 0:
+            if not trial_size < 0.5 + size or not restore(trial, stiffness, curved, mend):
                 break
-            back_substitute(factors, blend, 0.0, mend)
             for s in range(n):
                 for j in range(3):
                     trial[0][s, j] += mend[s, j]
