@@ -153,7 +153,7 @@ def drift_against_length(rng: np.random.Generator) -> list[dict[str, Any]]:
         ground = np.tile([0.6, 0.0, 0.0], (n, 1))
         angles = ground + strain
         centres, frames = chain_frames(angles)
-        end, plain = _long_double_end(angles)
+        end, plain = long_double_end(angles)
         recovered = angles_of_frames(frames) - ground
         energy = float(np.sum(recovered**2) / np.sum(strain**2) - 1.0)
         rows.append(
@@ -170,7 +170,7 @@ def drift_against_length(rng: np.random.Generator) -> list[dict[str, Any]]:
     return rows
 
 
-def _long_double_end(angles: Any) -> tuple[Any, float]:
+def long_double_end(angles: Any) -> tuple[Any, float]:
     """End of a chain in long double, and the orthonormality of a plain double product."""
     frame = np.eye(3, dtype=np.longdouble)
     plain = np.eye(3)

@@ -12,8 +12,9 @@ from dnacheck.model.chain import Chain, build_chain, uniform_stiffness
 from dnacheck.model.molecules import embedded
 from dnacheck.model.sequence import Sequence, parse_sequence
 from dnacheck.ring.discrete import NewtonOptions
-from dnacheck.ring.search import RingSearch, find_rings, search_minima
+from dnacheck.ring.search import RingSearch, SearchOptions, find_rings, search_minima
 from dnacheck.validate.cases.case import HardCase, hard_case
+from dnacheck.validate.cases.geometry import long_double_end
 from dnacheck.validate.verdict import Rule
 
 GROUP = "rings"
@@ -168,6 +169,26 @@ def shortest(rng: np.random.Generator) -> HardCase:
     )
 
 
+def longest(rng: np.random.Generator) -> HardCase:
+    """Ten thousand base pairs."""
+    chain = build_chain(_random(rng, 10_000))
+    found = find_rings(chain, SearchOptions(links=round(chain.relaxed_turns)))
+    gap, stable = math.inf, False
+    if found.equilibria:
+        end, _ = long_double_end(found.lowest.angles)
+        gap, stable = float(np.linalg.norm(end)), found.lowest.stable is True
+    return hard_case(
+        GROUP,
+        "N = 10 000",
+        "the ring is stable, and its end meets its start in extended precision (steps)",
+        f"{'stable' if stable else 'no stable ring'}, end {gap:.1e} from the start",
+        gap if stable else math.inf,
+        1e-7,
+        Rule.AT_MOST,
+        "round-off of 10,000 rotations, each of 1e-16, on a ring 3,000 steps across",
+    )
+
+
 def extreme_ratios(rng: np.random.Generator) -> HardCase:
     """K3/K1 from 0.05 to 20."""
     base = build_chain(_random(rng, 160))
@@ -296,6 +317,7 @@ CASES = (
     palindrome,
     both_strands,
     shortest,
+    longest,
     extreme_ratios,
     steep_wedge,
     first_base_pair,
