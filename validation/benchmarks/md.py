@@ -222,7 +222,7 @@ def main() -> None:
     kind = kinds.add_parser("fluctuation")
     kind.add_argument("molecule", nargs="?", default="11T15")
     kind.add_argument("--half-soft", action="store_true", help="soften half of it five times")
-    kind.add_argument("--samples", type=int, default=14000, help="of each of two replicas")
+    kind.add_argument("--samples", type=int, default=10000, help="of each of two replicas")
     kind.add_argument("--interval", type=int, default=45, help="time steps between two")
     kind.add_argument("--metropolis", type=int, default=60000, help="configurations in all")
     kind.add_argument("--directory", type=Path, help="of checkpoints; an existing one is resumed")

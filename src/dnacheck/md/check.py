@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from dnacheck.md.bead_chain import BeadChain, BeadEnergy, BeadOptions
 from dnacheck.md.ensemble import Ensemble, EnsembleOptions, sample_ensemble
 from dnacheck.md.ensemble_statistics import EnsembleStatistics, analyse_ensemble
+from dnacheck.md.findings import Finding, RingMatch
 from dnacheck.md.geometry import elastic_energies_RT, frames_of_beads
 from dnacheck.md.harmonic import LARGEST_DENSE, harmonic_fluctuation
 from dnacheck.md.minimise import BeadMinimum, MinimiseOptions, find_minima, minimise
@@ -22,7 +22,6 @@ from dnacheck.numerics.outcome import InputError, SolveError, Status
 from dnacheck.numerics.superpose import superpose
 
 Array = NDArray[np.float64]
-Verdict = Literal["pass", "fail", "inconclusive"]
 
 
 @dataclass(frozen=True)
@@ -66,64 +65,6 @@ class MdOptions:
                 raise InputError(f"MD option {name} must be positive")
         if self.noisy_rings < 1 or self.threads < 1 or self.seed < 0:
             raise InputError("noisy_rings and threads must be 1 or more, the seed 0 or more")
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One comparison.
-
-    Attributes
-    ----------
-    name : str
-    difference : float
-        What was found, as a deviation from what was expected.
-    tolerance : float
-    sigma : float
-        Standard error of the difference, 0 where there is none.
-    """
-
-    name: str
-    difference: float
-    tolerance: float
-    sigma: float = 0.0
-
-    @property
-    def verdict(self) -> Verdict:
-        """Whether the difference is within the tolerance.
-
-        "inconclusive" where twice the standard error exceeds the tolerance and could by itself
-        explain the difference.
-        """
-        if not np.isfinite(self.difference):
-            return "fail"
-        if 2.0 * self.sigma > self.tolerance and abs(self.difference) <= 3.0 * self.sigma:
-            return "inconclusive"
-        return "pass" if abs(self.difference) <= self.tolerance else "fail"
-
-
-@dataclass(frozen=True)
-class RingMatch:
-    """A ring that was given, beside the bead chain's.
-
-    Attributes
-    ----------
-    energy_RT : float
-        Of the ring, by the chain's own formula.
-    openmm_difference : float
-        Relative: OpenMM's energy of the same positions.
-    perturbed_difference, perturbed_rms_A : float
-        Relative energy and rms distance of the minimum reached from the perturbed ring; NaN if
-        minima were left out.
-    own_difference, own_rms_A : float
-        The same for the nearest minimum reached from planar circles.
-    """
-
-    energy_RT: float
-    openmm_difference: float
-    perturbed_difference: float
-    perturbed_rms_A: float
-    own_difference: float
-    own_rms_A: float
 
 
 @dataclass(frozen=True)
