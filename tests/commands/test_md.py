@@ -78,6 +78,8 @@ def test_a_trajectory_that_turns_to_nan_exits_3_and_keeps_the_frames_before(caps
     ("arguments", "message"),
     [
         (["--trajectory", "{d}/ring.dcd"], "--topology"),
+        (["--trajectory", "{d}/ring.dcd", "--topology", "{d}/small.pdb"], "cannot read"),
+        (["--trajectory", "{d}/ring.dcd", "--topology", "{d}/none.pdb"], "no file"),
         (["--trajectory", "{d}/none.dcd", "--topology", "{d}/ring.pdb"], "no file"),
         (["--topology", "{d}/ring.pdb"], "belongs to --trajectory"),
         (["--resume"], "--output"),
@@ -124,9 +126,39 @@ def test_json_of_a_molecule_and_the_files_of_a_run(capsys, tmp_path):
     assert "resume" in err
 
 
+SHORT_SEQUENCE = "CGATTCGAGCTAGGCATCGATTCCGAGCTAGGCATCGATTCCGA"
+
+
 @pytest.mark.md
 def test_a_step_too_long_exits_3_and_still_reports_the_minimum(capsys):
-    code, out, err = run(capsys, "11T15", "--samples", "20", "--step-fraction", "1.5", "--json")
+    code, out, err = run(
+        capsys, SHORT_SEQUENCE, "--samples", "20", "--step-fraction", "1.5", "--json"
+    )
     assert code == 3
-    assert "blew up" in err
+    assert "replica 0, before frame 0: the dynamics blew up" in err
+    assert "smaller step_fraction" in err
     assert json.loads(out)["energy_RT"] > 0.0
+
+
+@pytest.mark.md
+def test_frames_before_a_blow_up_are_written(capsys, tmp_path, monkeypatch):
+    from dnacheck.md import ensemble
+    from dnacheck.md.trajectory import open_trajectory
+
+    advance, calls = ensemble._advance, []
+
+    def failing(run, walker, steps):
+        calls.append(steps)
+        return "the dynamics blew up (by order)" if len(calls) == 9 else advance(run, walker, steps)
+
+    monkeypatch.setattr(ensemble, "_advance", failing)
+    code, out, err = run(
+        capsys, SHORT_SEQUENCE, "--samples", "20", "--replicas", "1", "-o", str(tmp_path / "run")
+    )
+    assert code == 3
+    assert "replica 0, frame 7: the dynamics blew up" in err
+    assert "with 7 configurations kept" in out
+    universe = open_trajectory(
+        tmp_path / "run" / "trajectory.dcd", tmp_path / "run" / "topology.pdb"
+    )
+    assert len(universe.trajectory) == 7

@@ -79,7 +79,8 @@ def sampled(
 ) -> tuple[Ensemble, EnsembleStatistics, float]:
     """Dynamics about a ring, its statistics, and the processor time it took."""
     began = time.process_time()
-    start = BeadChain(chain).positions(ring.angles)
+    # Rounded, so that a run can be resumed whatever the ring solver's last digits have become.
+    start = np.round(BeadChain(chain).positions(ring.angles), 5)
     resume = directory is not None and directory.exists()
     ensemble = sample_ensemble(chain, start, True, options, None, 1, directory, resume)
     seconds = time.process_time() - began

@@ -159,4 +159,8 @@ def print_check(check: MdCheck) -> None:
                 f"  {finding.verdict}: {finding.name}: {finding.difference:.2e} "
                 f"(tolerance {finding.tolerance:.0e}, standard error {finding.sigma:.0e})"
             )
-    click.echo(f"  {'every check passed' if check.passed else 'A CHECK FAILED'}")
+    if check.trouble:
+        kept = 0 if ensemble is None else len(ensemble.positions)
+        click.echo(f"  STOPPED EARLY, with {kept} configurations kept: {check.trouble}")
+    else:
+        click.echo(f"  {'every check passed' if check.passed else 'A CHECK FAILED'}")
