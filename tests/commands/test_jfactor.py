@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -62,6 +63,35 @@ def test_a_tolerance_out_of_reach_gives_the_best_so_far(capsys):
     assert record["stderr"] > 1e-5
     assert abs(record["minus_lnJ"] - 19.71) < 0.1
     assert "tolerance was not met" in record["status"]
+
+
+@pytest.mark.parametrize("method", ["closure", "half-chain", "metropolis"])
+def test_time_runs_out_for_every_sampler(capsys, method):
+    limit = ("--tolerance", "1e-5", "--max-seconds", "0.5")
+    code, out, _ = run(capsys, "jfactor", "08T15", "--json", "--method", method, *limit)
+    record = json.loads(out)
+    assert code == 3
+    assert record["stderr"] > 1e-5
+    assert abs(record["minus_lnJ"] - 15.77) < 4.0 * record["stderr"]
+    assert "tolerance was not met" in record["status"]
+
+
+def test_a_molecule_without_a_stable_ring_is_said(capsys, monkeypatch):
+    from dnacheck.ring import search
+
+    def nothing(chain, options=None):
+        found = find_rings(chain, options)
+        return replace(found, equilibria=(), links_searched=(3,))
+
+    find_rings = search.find_rings
+    monkeypatch.setattr(search, "find_rings", nothing)
+    monkeypatch.setattr("dnacheck.jfactor.register._seeds", lambda found: {})
+    for method in ("auto", "laplace", "closure", "half-chain", "metropolis"):
+        code, out, err = run(capsys, "jfactor", "08T15", "--method", method)
+        assert code == 3, method
+        assert "no stable ring" in err
+        assert "link" in err
+        assert "ln J" not in out
 
 
 @pytest.mark.parametrize("method", ["laplace", "register-laplace", "corrected-laplace", "closure"])

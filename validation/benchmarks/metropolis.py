@@ -66,8 +66,8 @@ def short() -> None:
 
 def calibration() -> None:
     """Stated errors of short runs of many seeds against their scatter about exact closure."""
-    print(f"\nMetropolis with MBAR over {CALIBRATION_RUNS} seeds, 4 copies of 100 records")
-    options = UmbrellaOptions(samples=100, burn_in=50, thinning=2, threads=2)
+    print(f"\nMetropolis with MBAR over {CALIBRATION_RUNS} seeds, 4 copies of 100 sweeps")
+    options = UmbrellaOptions(samples=100, burn_in=24, thinning=1, threads=2)
     for name in ("09T15", "08A17"):
         search = find_rings(build_chain(embedded(name)))
         exact = sample_closure(search, ClosureOptions(tolerance=0.005), SEED).minus_lnJ

@@ -174,15 +174,9 @@ def _computed(
         from dnacheck.jfactor.choose import half_chains_to_tolerance
 
         return half_chains_to_tolerance(search, tolerance, limit, run.seed, run.threads), ""
-    from dataclasses import replace
+    from dnacheck.jfactor.choose import metropolis_to_tolerance
 
-    from dnacheck.jfactor.result import JStatus
-    from dnacheck.jfactor.umbrella import UmbrellaOptions, metropolis
-
-    result = metropolis(search, UmbrellaOptions(threads=run.threads), run.seed)
-    if result.status.ok and result.total_error > tolerance:
-        result = replace(result, status=JStatus.TOLERANCE_NOT_MET)
-    return result, ""
+    return metropolis_to_tolerance(search, tolerance, limit, run.seed, run.threads), ""
 
 
 def _print(result: JFactor, reason: str) -> None:

@@ -28,6 +28,8 @@ _PILOT_SIGMAS = 2.4
 t with seven degrees of freedom)."""
 _FIRST_HALVES = 4_000
 _MOST_HALVES = 256_000
+_FIRST_RECORDS = 24
+_MOST_RECORDS = 500
 
 
 @dataclass(frozen=True)
@@ -124,6 +126,41 @@ def half_chains_to_tolerance(
     return best
 
 
+def metropolis_to_tolerance(
+    search: RingSearch,
+    tolerance: float,
+    max_seconds: float = math.inf,
+    seed: int | np.random.SeedSequence = 0,
+    threads: int = 1,
+) -> JFactor:
+    """Restrained Metropolis chains: a pilot, then as long a run as the tolerance or the time asks.
+
+    Raises
+    ------
+    SolveError
+        No stable ring at any link searched.
+    """
+    from dnacheck.jfactor.umbrella import UmbrellaOptions, metropolis
+
+    checked_tolerance(tolerance)
+    sequence = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
+    first, second = (np.random.default_rng(stream) for stream in sequence.spawn(2))
+    pilot = UmbrellaOptions(samples=_FIRST_RECORDS, burn_in=16, threads=threads)
+    began = time.perf_counter()
+    best = metropolis(search, pilot, first)
+    elapsed = time.perf_counter() - began
+    records = _FIRST_RECORDS * (best.stderr / tolerance) ** 2
+    # A fifth of a run goes into tuning the moves.
+    records = min(records, _MOST_RECORDS, 0.8 * _FIRST_RECORDS * (max_seconds / elapsed - 1.0))
+    if best.total_error > tolerance and records > 2 * _FIRST_RECORDS:
+        count = int(records)
+        options = UmbrellaOptions(samples=count, burn_in=max(16, count // 5), threads=threads)
+        best = metropolis(search, options, second)
+    if best.total_error > tolerance:
+        best = replace(best, status=JStatus.TOLERANCE_NOT_MET)
+    return best
+
+
 def choose(
     target: Chain | RingSearch,
     tolerance: float,
@@ -194,8 +231,12 @@ def choose(
         results = [sampled]
     deadline = began + max_seconds
     left = deadline - time.perf_counter()
+    halves = None
     if left > 0.0 and search.equilibria:
-        halves = half_chains_to_tolerance(search, tolerance, left, seeds[2], threads)
+        # Too few pairs that meet are no reason to give up what closure sampling found.
+        with contextlib.suppress(SolveError):
+            halves = half_chains_to_tolerance(search, tolerance, left, seeds[2], threads)
+    if halves is not None:
         met = halves.total_error <= tolerance and halves.status is not JStatus.HEAVY_TAILS
         attempts.append(
             Attempt("half-chain", halves.minus_lnJ, halves.total_error, halves.seconds, met)
