@@ -1,7 +1,10 @@
 """Running, resuming, reporting."""
 
+import base64
 import csv
+import gzip
 import json
+import re
 from dataclasses import replace
 
 import jsonschema
@@ -21,7 +24,7 @@ from dnacheck.validate.report.tables import table_csv
 from dnacheck.validate.report.write import report_json
 from dnacheck.validate.runner import run_checks
 from dnacheck.validate.scene_file import load_scene
-from dnacheck.validate.sections import Column, Figure, Note, Table
+from dnacheck.validate.sections import Column, Figure, Note, Rings, Table
 from dnacheck.validate.state import StateFolder, findings_from_json, findings_to_json, run_key
 from dnacheck.validate.verdict import Rule, Verdict, judge, must_fail
 
@@ -156,6 +159,17 @@ def test_figures_are_drawn_the_same_twice(scene):
     (_, one), (_, two) = report_html(record), report_html(record)
     assert one == two
     assert one["drift"].startswith("<svg")
+
+
+def test_the_drawing_library_travels_compressed(scene):
+    points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
+    ring = {"name": "x", "curves": [{"label": "x", "style": "line", "points": points}]}
+    page, _ = report_html(record_of(scene, Findings([good()], [Rings("r", "R", [ring])])))
+    packed = re.search(r'id="plotly-source">([^<]*)<', page)
+    assert b"plotly" in gzip.decompress(base64.b64decode(packed[1]))[:200]
+    assert len(page) < 3e6
+    without, _ = report_html(record_of(scene, findings()))
+    assert 'id="plotly-source"' not in without
 
 
 def test_baseline_tells_what_changed(scene, tmp_path):

@@ -164,13 +164,18 @@ def page(tmp_path_factory):
 @pytest.mark.parametrize("width", [390, 1280])
 def test_report_in_a_browser(width, page, tmp_path):
     assert page.stat().st_size < 8e6
-    # the page tells about itself: how wide it is, and every error and request it saw
+    # the page tells about itself: how wide it is, every error and request it saw, and whether the
+    # rings are drawn once they come into view
     probe = (
         "<script>window.problems=[];window.addEventListener('error',e=>problems.push(e.message));"
-        "window.addEventListener('load',()=>setTimeout(()=>{const d=document.documentElement;"
+        "window.addEventListener('unhandledrejection',e=>problems.push(String(e.reason)));"
+        "window.addEventListener('load',()=>{"
+        "document.querySelector('.rings-stage').scrollIntoView();"
+        "setTimeout(()=>{const d=document.documentElement;"
         "const r=performance.getEntriesByType('resource').map(x=>x.name)"
         ".filter(x=>!x.startsWith('data:'));"
-        "document.title=JSON.stringify({over:d.scrollWidth-d.clientWidth,problems,r})},1500))"
+        "const rings=document.querySelectorAll('.rings-stage canvas').length;"
+        "document.title=JSON.stringify({over:d.scrollWidth-d.clientWidth,problems,r,rings})},6000)})"
         "</script>"
     )
     # The frame gives the page its width: the window of a headless browser has a smallest one.
@@ -183,10 +188,11 @@ def test_report_in_a_browser(width, page, tmp_path):
         "if(f&&f.title.startsWith('{'))document.body.dataset.seen=f.title},200)</script>"
     )
     command = [
-        CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic",
+        CHROMIUM, "--headless", "--no-sandbox", "--disable-quic",
+        "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
         "--no-first-run", "--disable-background-networking", "--disable-component-update",
         "--disable-sync", "--allow-file-access-from-files", f"--user-data-dir={tmp_path / 'user'}",
-        "--enable-logging=stderr", "--window-size=1400,1000", "--virtual-time-budget=10000",
+        "--enable-logging=stderr", "--window-size=1400,1000", "--virtual-time-budget=20000",
         "--dump-dom", frame.as_uri(),
     ]  # fmt: skip
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
@@ -196,6 +202,7 @@ def test_report_in_a_browser(width, page, tmp_path):
     seen = json.loads(html.unescape(found[1]))
     assert seen["over"] <= 0, seen
     assert seen["problems"] == []
+    assert seen["rings"] > 0
     assert seen["r"] == []
     console = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
     errors = [line for line in console if "error" in line.lower()]

@@ -33,16 +33,23 @@
   function drawable() {
     try {
       const canvas = document.createElement("canvas");
-      return !!(window.WebGLRenderingContext && canvas.getContext("webgl"));
+      return !!(window.DecompressionStream && window.WebGLRenderingContext && canvas.getContext("webgl"));
     } catch (error) {
       return false;
     }
   }
-  function loadPlotly() {
-    if (window.Plotly) return;
+  async function unpack() {
+    const text = atob(document.getElementById("plotly-source").textContent);
+    const bytes = Uint8Array.from(text, function (letter) { return letter.charCodeAt(0); });
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
     const script = document.createElement("script");
-    script.textContent = document.getElementById("plotly-source").textContent;
+    script.textContent = await new Response(stream).text();
     document.head.appendChild(script);
+  }
+  let unpacked = null;
+  function loadPlotly() {
+    if (unpacked === null) unpacked = unpack();
+    return unpacked;
   }
   const COLOURS = { axis: "#8a97a3", strand1: "#1f5fa8", strand2: "#b4511f" };
   function traces(ring) {
@@ -63,8 +70,10 @@
       return trace;
     });
   }
-  function show(stage, ring) {
-    loadPlotly();
+  async function show(stage, ring) {
+    await loadPlotly();
+    const wait = stage.querySelector("p.wait");
+    if (wait) wait.remove();
     const axis = { visible: false };
     Plotly.react(stage, traces(ring), {
       margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: stage.clientWidth > 600,
@@ -84,9 +93,7 @@
     }
     let started = false;
     function update() {
-      if (!started) stage.textContent = "";
-      started = true;
-      show(stage, rings[Number(select.value)]);
+      show(stage, rings[Number(select.value)]).then(function () { started = true; });
     }
     select.addEventListener("change", update);
     window.addEventListener("resize", function () {
