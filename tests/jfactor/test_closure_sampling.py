@@ -9,7 +9,7 @@ from dense_closure import brute_force_log_j
 from short_chains import closed_ground_chain, end_poses, exact_free_angles
 
 from dnacheck.jfactor.closure_sampling import ClosureOptions, ClosureSampler, sample_closure
-from dnacheck.jfactor.draw_kernels import NO_CROSSING, chart_of_link
+from dnacheck.jfactor.draw_kernels import COUNTED, NO_CROSSING, chart_of_link
 from dnacheck.jfactor.fibre_kernels import solve_six
 from dnacheck.jfactor.held_ring import RegisterOptions
 from dnacheck.jfactor.register import register_profile
@@ -134,6 +134,16 @@ def test_links_add_up_to_j():
     total = sum(math.exp(-share.minus_lnJ) for share in result.links)
     assert result.J_molar == pytest.approx(total, rel=1e-9)
     assert len(result.links) >= 2
+
+
+def test_a_link_whose_weight_underflows_has_no_share():
+    profile = register_profile(closed_ground_chain())
+    sampler = ClosureSampler(profile, ClosureOptions(), 1)
+    draws = sampler._round(4, 8, 0.0)
+    draws.log_weights[0, 0], draws.links[0, 0], draws.codes[0, 0] = -900.0, 99, COUNTED
+    result = sampler._result(draws, 0.0)
+    assert math.isfinite(result.minus_lnJ)
+    assert 99 not in [share.link for share in result.links]
 
 
 def test_unreachable_tolerance_is_said():

@@ -300,6 +300,8 @@ class ClosureSampler:
         for link in np.unique(draws.links[counted]):
             part = np.where(counted & (draws.links == link), weights, 0.0).mean(axis=1)
             values = _batch_means(part, draws.batch)
+            if not values.mean() > 0.0:  # so far out that its weight underflows
+                continue
             log_parts[int(link)] = self.log_laplace + math.log(values.mean())
             errors[int(link)] = batch_error(values) / float(values.mean())
         warnings = [*chain.warnings, *profile.warnings]
