@@ -172,6 +172,33 @@ def test_the_drawing_library_travels_compressed(scene):
     assert 'id="plotly-source"' not in without
 
 
+def test_the_check_nearest_to_its_limit_is_shown(scene):
+    from dnacheck.validate.report.glance import glance, share_used
+    from dnacheck.validate.sections import Section
+
+    def judged(name, got, rule, tolerance=None, **more):
+        return judge(f"table2.{name}", "q", got, 2.0, rule, "s", "w", tolerance, **more)
+
+    assert share_used(judged("a", 2.1, Rule.RELATIVE, 0.1)) == pytest.approx(0.5)
+    assert share_used(judged("a", 2.1, Rule.ABSOLUTE, 0.2)) == pytest.approx(0.5)
+    assert share_used(judged("a", 1.0, Rule.AT_MOST)) == pytest.approx(0.5)
+    assert share_used(judged("a", 4.0, Rule.AT_LEAST)) == pytest.approx(0.5)
+    sigmas = judged("a", 3.0, Rule.SIGMAS, 4.0, got_sigma=0.3, expected_sigma=0.4)
+    assert share_used(sigmas) == pytest.approx(0.5)
+    assert share_used(judged("a", "2", Rule.EQUAL)) is None
+    results = [
+        judged("far", 2.01, Rule.RELATIVE, 0.1),
+        judged("near", 2.19, Rule.RELATIVE, 0.1),
+        must_fail(judged("control", 9.0, Rule.RELATIVE, 0.1), "it is wrong"),
+    ]
+    (line,) = glance([Section("table2", "Table II", "")], results)
+    assert line.closest is results[1]
+    assert (line.passed, line.checks, line.refused, line.controls) == (2, 2, 1, 1)
+    assert line.verdict == "pass"
+    page, _ = report_html(record_of(scene, Findings(results)))
+    assert "table2.near" in page[: page.index('<section id="table2"')]
+
+
 def test_baseline_tells_what_changed(scene, tmp_path):
     old = record_of(scene, Findings([good("a"), good("b"), good("c")], []))
     path = tmp_path / "old.json"

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dnacheck.validate.report.figures import draw_svg
+from dnacheck.validate.report.glance import glance
 from dnacheck.validate.report.tables import cell_text, table_csv
 from dnacheck.validate.sections import Block, Column, Figure, Note, Rings, Table
 from dnacheck.validate.verdict import CheckResult, Verdict
@@ -54,6 +55,7 @@ def report_html(record: RunRecord) -> tuple[str, dict[str, str]]:
         skipped=[r for r in record.results if r.verdict is Verdict.SKIPPED],
         summary=[view for view in blocks if view["summary"]],
         sections=views,
+        glance=glance(sections, record.results),
         style=(TEMPLATES / "report.css").read_text(encoding="utf-8"),
         script=(TEMPLATES / "report.js").read_text(encoding="utf-8"),
         plotly=_plotly() if uses_rings else "",

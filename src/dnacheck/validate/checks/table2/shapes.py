@@ -38,7 +38,6 @@ def shape(context: Context) -> Findings:
         "Figure 11",
         width=4.6,
         height=4.4,
-        summary=True,
     )
     shown = [{"name": case.name, "curves": _curves(case)} for case in found]
     turn = Rings(
