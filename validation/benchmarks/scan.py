@@ -50,7 +50,7 @@ def rate(folder: Path) -> None:
 
 def kills(folder: Path) -> None:
     """A scan killed ten times at random moments, against an uninterrupted one."""
-    source = library(folder / "kills.fasta", 3000)
+    source = library(folder / "kills.fasta", 12_000)
     scan(source, folder / "whole.csv", ScanOptions(threads=2))
     output = folder / "killed.csv"
     command = [sys.executable, "-m", "dnacheck", "scan", str(source), "-o", str(output), "--quiet"]
@@ -59,7 +59,7 @@ def kills(folder: Path) -> None:
     for _ in range(40):
         process = subprocess.Popen(command)
         try:
-            process.wait(timeout=rng.uniform(2.0, 8.0) if killed < 10 else None)
+            process.wait(timeout=rng.uniform(1.5, 3.5) if killed < 10 else None)
             break
         except subprocess.TimeoutExpired:
             process.send_signal(signal.SIGKILL)

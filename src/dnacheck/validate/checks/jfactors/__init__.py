@@ -7,6 +7,7 @@ from typing import Any
 
 from dnacheck.validate.checks.jfactors.acceptance import acceptance
 from dnacheck.validate.checks.jfactors.methods import laplace, pairwise
+from dnacheck.validate.checks.jfactors.straight import only_homopolymers, straight
 from dnacheck.validate.checks.jfactors.table3 import shifts, table3
 from dnacheck.validate.checks.jfactors.timing import speed
 from dnacheck.validate.registry import Check, Findings, Group
@@ -90,6 +91,8 @@ GROUP = Group(
               requires=("dnacheck.jfactor.table3",)),
         Check("jfactor.shifts", "entropy shifts (Figures 17 to 19)", shifts, 5.0, _NEEDS,
               applies=_paper, requires=("dnacheck.jfactor.table3",)),
+        Check("jfactor.straight", "straight molecules beside the rod", straight, 110.0, _NEEDS,
+              applies=only_homopolymers, requires=("dnacheck.jfactor.anharmonic",)),
         Check("jfactor.speed", "error against time", speed, 20.0, _NEEDS, applies=_paper,
               requires=("dnacheck.jfactor.speed",)),
     ),
