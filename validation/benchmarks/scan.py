@@ -83,6 +83,9 @@ def memory(folder: Path) -> None:
         done += pieces
 
     summary = scan(source, folder / "memory.csv", ScanOptions(threads=2), watch)
+    for line in (folder / "memory.csv").read_text().splitlines()[1:]:
+        if not line.endswith(",ok"):
+            print(f"not ok: {line}")
     print(f"{summary.rows} rows in {summary.seconds:.0f} s, {summary.failed_rows} without a ring")
 
 

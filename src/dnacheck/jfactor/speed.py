@@ -62,7 +62,7 @@ LONG = SpeedOptions(
     batches=(20, 80, 320, 1280),
     pairs=(50, 200, 800, 3200),
     halves=(4_000, 8_000, 16_000, 32_000),
-    plain_halves=(20_000, 80_000, 240_000),
+    plain_halves=(20_000, 80_000),
     records=(40, 100, 250),
 )
 
