@@ -215,6 +215,36 @@ def test_the_measure_of_frames_stiffens_theta():
 
 
 @pytest.mark.md
+def test_half_the_time_step_leaves_a_ring_as_it_is():
+    """Mean energy and variances of a ring at the default step, at half of it, by Metropolis."""
+    from dnacheck.jfactor.metropolis import ClosedRingOptions, closed_ring_ensemble
+    from dnacheck.ring.search import find_rings
+
+    chain = ring_chain(24)
+    ring = find_rings(chain).lowest
+    start = BeadChain(chain).positions(ring.angles)
+    energies, variances, errors = [], [], []
+    for fraction, interval in ((0.45, 12), (0.225, 24)):
+        options = EnsembleOptions(
+            samples=1200, interval=interval, burn_in=30, replicas=1, step_fraction=fraction, seed=8
+        )
+        sampled = sample_ensemble(chain, start, True, options)
+        energies.append(estimate(np.stack(sampled.elastic_RT())))
+        angles = np.stack(sampled.angles())
+        squares = ((angles - angles.mean(axis=(0, 1))) ** 2).mean(axis=2)
+        variances.append(squares.mean(axis=(0, 1)))
+        errors.append(block_stderr(squares))
+    other = closed_ring_ensemble(chain, ring, ClosedRingOptions(samples=1500), 3)
+    exact = (other.angle_deviation**2).mean(axis=0)
+    for energy, variance, error in zip(energies, variances, errors, strict=True):
+        sigma = np.hypot(energy.stderr, other.energy_RT.stderr)
+        assert sigma < 0.01 * other.energy_RT.mean
+        assert abs(energy.mean - other.energy_RT.mean) < 3.5 * sigma
+        assert np.all(error < 0.02 * exact)
+        assert np.all(np.abs(variance - exact) < 3.5 * np.hypot(error, 0.01 * exact))
+
+
+@pytest.mark.md
 def test_replicas_side_by_side_and_openmms_own_checkpoints(tmp_path):
     chain = ring_chain(12)
     start = BeadEnergy(BeadChain(chain)).beads.positions(chain.ground)

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from dnacheck.validate.checks.bead_ensemble import LONGEST, ensemble, profile
 from dnacheck.validate.context import Context
 from dnacheck.validate.registry import Check, Findings, Group, Level
 from dnacheck.validate.scene import Scene
-from dnacheck.validate.sections import Column, Table
+from dnacheck.validate.sections import Column, Figure, Table
 from dnacheck.validate.verdict import CheckResult, Rule, judge, must_fail
 
 if TYPE_CHECKING:
+    from dnacheck.md.check import MdCheck
     from dnacheck.model.chain import Chain
+    from dnacheck.ring.discrete import DiscreteRing
 
 ENERGY_TOLERANCE = 1e-10
 MINIMUM_TOLERANCE = 1e-5
@@ -94,7 +97,8 @@ def minimum(context: Context) -> Findings:
     results, rows = [], []
     for chain in chains if context.level is Level.FULL else chains[-1:]:
         ring = lowest_ring(chain)
-        match = run_md_check(chain, ring.angles, options).rings[0]
+        found = run_md_check(chain, ring.angles, options)
+        match = found.rings[0]
         row: dict[str, Any] = {"name": chain.name, "energy": match.energy_RT}
         for start, difference, rms in (
             ("perturbed ring", match.perturbed_difference, match.perturbed_rms_A),
@@ -129,12 +133,49 @@ def minimum(context: Context) -> Findings:
         columns.append(Column(f"{start} energy", "energy, relative", "", "+.0e", "", group))
         columns.append(Column(f"{start} rms", "rms", "Å", ".0e", "", group))
     table = Table("bead-minimum", "Minimised bead chains", columns, rows)
-    return Findings(results, [table])
+    return Findings(results, [table, *_shape(found, ring)])
+
+
+def _shape(found: MdCheck, ring: DiscreteRing) -> list[Figure]:
+    """The nearest minimum from planar circles over the discrete ring, on principal axes."""
+    import numpy as np
+
+    from dnacheck.numerics.superpose import superpose
+
+    if not found.minima:
+        return []
+    centres = found.chain.rise_A * ring.centres[:-1]
+    centres = centres - centres.mean(axis=0)
+    axes = np.linalg.svd(centres, full_matrices=False)[2].T
+    axes[:, 2] *= np.linalg.det(axes)
+    centres = centres @ axes
+    moved, rms = min(
+        (superpose(minimum.centres_A, centres)[:2] for minimum in found.minima),
+        key=lambda pair: float(pair[1]),
+    )
+    return [
+        Figure(
+            "bead-shape",
+            f"{found.chain.name}: the bead chain's own minimum over the discrete ring",
+            "bead_ring",
+            {"discrete": centres.tolist(), "beads": np.asarray(moved).tolist()},
+            "Base-pair centres. The bead chain was relaxed from planar circles made of nothing "
+            f"but the sequence; rms distance {rms:.1e} Å.",
+            width=3.6,
+            height=3.4,
+        )
+    ]
 
 
 def _applies(scene: Scene) -> str | None:
     if max(len(letters) for _, letters, _ in scene.resolved) > 1000:
         return "a molecule has more than 1000 base pairs"
+    return None
+
+
+def _shaken(scene: Scene) -> str | None:
+    if min(len(letters) for _, letters, _ in scene.resolved) > LONGEST:
+        return f"every molecule has more than {LONGEST} base pairs"
     return None
 
 
@@ -147,5 +188,10 @@ GROUP = Group(
               ("thermal_energy",), applies=_applies, requires=("dnacheck.md.check", "openmm")),
         Check("bead_chain.minimum", "rings found by the bead chain", minimum, 10.0,
               ("thermal_energy",), applies=_applies, requires=("dnacheck.md.check", "openmm")),
+        Check("bead_chain.ensemble", "rings in thermal motion", ensemble, 70.0,
+              ("thermal_energy",), applies=_shaken, requires=("dnacheck.md.check", "openmm")),
+        Check("bead_chain.profile", "fluctuation along a molecule with one soft half", profile,
+              45.0, ("thermal_energy",), applies=_shaken,
+              requires=("dnacheck.md.check", "openmm")),
     ),
 )  # fmt: skip
