@@ -127,7 +127,7 @@ class JFactor:
         return math.hypot(self.stderr, self.bias_bound or 0.0)
 
     def to_json(self) -> dict[str, Any]:
-        """The members that CLI.md promises, and the rest of what is known."""
+        """The members of the command's JSON."""
         return {
             "target": self.target,
             "n_bp": self.n_bp,
