@@ -93,7 +93,7 @@ GROUP = Group(
               applies=_paper, requires=("dnacheck.jfactor.table3",)),
         Check("jfactor.straight", "straight molecules beside the rod", straight, 110.0, _NEEDS,
               applies=only_homopolymers, requires=("dnacheck.jfactor.anharmonic",)),
-        Check("jfactor.speed", "error against time", speed, 20.0, _NEEDS, applies=_paper,
+        Check("jfactor.speed", "error against time", speed, 25.0, _NEEDS, applies=_paper,
               requires=("dnacheck.jfactor.speed",)),
     ),
     assemble,
