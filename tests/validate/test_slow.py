@@ -175,7 +175,7 @@ def test_report_in_a_browser(width, page, tmp_path):
         "const r=performance.getEntriesByType('resource').map(x=>x.name)"
         ".filter(x=>!x.startsWith('data:'));"
         "const rings=document.querySelectorAll('.rings-stage canvas').length;"
-        "document.title=JSON.stringify({over:d.scrollWidth-d.clientWidth,problems,r,rings})},6000)})"
+        "document.title=JSON.stringify({over:d.scrollWidth-d.clientWidth,problems,r,rings})},60000)})"
         "</script>"
     )
     # The frame gives the page its width: the window of a headless browser has a smallest one.
@@ -192,7 +192,7 @@ def test_report_in_a_browser(width, page, tmp_path):
         "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
         "--no-first-run", "--disable-background-networking", "--disable-component-update",
         "--disable-sync", "--allow-file-access-from-files", f"--user-data-dir={tmp_path / 'user'}",
-        "--enable-logging=stderr", "--window-size=1400,1000", "--virtual-time-budget=20000",
+        "--enable-logging=stderr", "--window-size=1400,1000", "--virtual-time-budget=150000",
         "--dump-dom", frame.as_uri(),
     ]  # fmt: skip
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
