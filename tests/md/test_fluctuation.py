@@ -85,26 +85,27 @@ def test_dynamics_and_metropolis_fluctuate_alike_where_one_half_is_soft(form):
     """A strong profile under a full stiffness; the uniform chain's profile must not pass."""
     from dnacheck.jfactor.metropolis import ClosedRingOptions, closed_ring_ensemble
 
-    chain = replace(softened(ring_chain(40), 0.15), step_form=form)
+    chain = replace(softened(ring_chain(60), 0.15), step_form=form)
     ring = find_rings(chain).lowest
     energy = BeadEnergy(BeadChain(chain))
     minimum = minimise(energy, energy.beads.positions(ring.angles))
     assert minimum.energy_RT == pytest.approx(ring.energy_RT, rel=1e-8)
-    options = EnsembleOptions(samples=1200, interval=12, burn_in=60, seed=4)
+    options = EnsembleOptions(samples=1200, interval=15, burn_in=60, seed=4)
     sampled = sample_ensemble(chain, minimum.positions, True, options)
-    ours = fluctuation_profile(sampled.positions[:, 0::2].reshape(2, -1, 40, 3), minimum.centres_A)
+    ours = fluctuation_profile(sampled.positions[:, 0::2].reshape(2, -1, 60, 3), minimum.centres_A)
     other = closed_ring_ensemble(chain, ring, ClosedRingOptions(samples=1500), 2)
     theirs = fluctuation_profile(
-        other.centres_A.astype(float).reshape(4, 1500, 40, 3), minimum.centres_A
+        other.centres_A.astype(float).reshape(4, 1500, 60, 3), minimum.centres_A
     )
     found = compare_profiles(ours, theirs)
     assert found.variation > 0.1
     assert found.correlation >= 0.99
-    assert abs(found.mean_ratio - 1.0) < 0.03
-    assert abs(found.mean_ratio - 1.0) < 4.0 * found.mean_ratio_stderr
+    # Some hundred independent shapes: 3 % to within two standard errors.
+    assert found.mean_ratio_stderr < 0.025
+    assert abs(found.mean_ratio - 1.0) < 0.03 + 2.0 * found.mean_ratio_stderr
     mean = estimate(np.stack(sampled.elastic_RT()))
     gap = mean.mean - other.energy_RT.mean
     assert abs(gap) < 4.0 * np.hypot(mean.stderr, other.energy_RT.stderr)
-    uniform = BeadEnergy(BeadChain(replace(chain, stiffness=coupled_stiffness(40))))
+    uniform = BeadEnergy(BeadChain(replace(chain, stiffness=coupled_stiffness(60))))
     flat = harmonic_fluctuation(uniform, minimise(uniform, minimum.positions))
     assert np.corrcoef(flat, theirs.fluctuation_A)[0, 1] < 0.9

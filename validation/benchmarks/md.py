@@ -30,6 +30,7 @@ from dnacheck.md.harmonic import harmonic_fluctuation
 from dnacheck.md.minimise import MinimiseOptions, minimise
 from dnacheck.model.chain import Chain, build_chain
 from dnacheck.model.molecules import embedded
+from dnacheck.numerics.outcome import SolveError
 from dnacheck.ring.discrete import DiscreteRing
 from dnacheck.ring.search import find_rings
 
@@ -148,7 +149,11 @@ def show_time_steps(name: str, samples: int, fractions: Sequence[float]) -> None
     for fraction in fractions:
         interval = round(30 * 0.45 / fraction)
         options = EnsembleOptions(samples=samples, interval=interval, step_fraction=fraction)
-        ensemble, s, seconds = sampled(chain, ring, options)
+        try:
+            ensemble, s, seconds = sampled(chain, ring, options)
+        except SolveError as trouble:
+            print(f"  {fraction:8.3f}  {trouble}", flush=True)
+            continue
         variance = s.angle_variance.mean(axis=0)
         error = np.sqrt(np.mean(s.angle_variance_stderr**2, axis=0) / chain.n_steps)
         first = variance if first is None else first
