@@ -85,7 +85,7 @@ GROUP = Group(
               requires=("dnacheck.jfactor.closure_sampling",)),
         Check("jfactor.pairwise", "every two methods, half chains and Metropolis too", pairwise,
               45.0, _NEEDS, requires=("dnacheck.jfactor.compare",)),
-        Check("jfactor.acceptance", "Metropolis moves keep their distribution", acceptance, 6.0,
+        Check("jfactor.acceptance", "Metropolis moves keep their distribution", acceptance, 12.0,
               _NEEDS, requires=("dnacheck.jfactor.metropolis_kernels",)),
         Check("jfactor.table3", "Table III", table3, 6.0, _NEEDS, applies=_paper,
               requires=("dnacheck.jfactor.table3",)),

@@ -24,6 +24,9 @@ SIGMAS = 5.0
 _STEPS = 4
 _STIFFNESS_RT = 9.0
 """So soft that cos(theta), the measure of rotations over that of angles, varies by a tenth."""
+_RING_STIFFNESS_RT = 60.0
+_ENERGY_SHARE = 0.9
+"""Fraction of the energy that wrong acceptance rules use."""
 _REACH = 0.8
 _SWEEPS = 4
 
@@ -122,6 +125,55 @@ _ENERGY = "change of the mean of 2E/RT per angle"
 _MEASURE = "change of the mean logarithm of the measure of rotations"
 
 
+def _closed_energy(chain: Chain, constrained: bool, seed: int) -> tuple[float, float]:
+    """Mean energy (RT) of a closed ring and its standard error, by one kind of move."""
+    from dnacheck.jfactor.metropolis import ClosedRingOptions, closed_ring_ensemble
+    from dnacheck.ring.search import find_rings
+
+    options = (
+        ClosedRingOptions(samples=400, thinning=2, crankshafts=0, constrained=10)
+        if constrained
+        else ClosedRingOptions(samples=800, thinning=10, constrained=0)
+    )
+    energy = closed_ring_ensemble(chain, find_rings(chain).lowest, options, seed).energy_RT
+    return energy.mean, energy.stderr
+
+
+def _closed_rings(seed: int) -> list[CheckResult]:
+    """Constrained moves against crankshafts: they share no acceptance rule."""
+    from dnacheck.model.chain import Chain
+
+    rng = np.random.default_rng(1)
+    n = 20
+    ground = np.array([4.0 * math.pi / n, 0.0, 0.0])
+    ground = ground + np.array([0.05, 0.1, 0.1]) * rng.uniform(-1.0, 1.0, (n, 3))
+    root = np.eye(3) + 0.1 * rng.standard_normal((n, 3, 3))
+    stiffness = root @ root.transpose(0, 2, 1)
+    ring = Chain("closed", ground, stiffness, persistence_length_A=3.4 * _RING_STIFFNESS_RT)
+    hot = replace(ring, persistence_length_A=_ENERGY_SHARE * ring.persistence_length_A)
+    expected, expected_sigma = _closed_energy(ring, False, seed)
+
+    def judged(item: str, got: float, sigma: float) -> CheckResult:
+        return judge(
+            f"jfactor.acceptance[{item}]",
+            "mean energy of a closed ring by constrained moves",
+            got,
+            expected,
+            Rule.SIGMAS,
+            "the same by crankshafts",
+            "standard errors from autocorrelation and from copies",
+            SIGMAS,
+            "RT",
+            got_sigma=sigma,
+            expected_sigma=expected_sigma,
+        )
+
+    own = judged("closed ring", *_closed_energy(ring, True, seed + 1))
+    mean, sigma = _closed_energy(hot, True, seed + 2)
+    wrong = judged("control: closed ring", mean / _ENERGY_SHARE, sigma / _ENERGY_SHARE)
+    return [own, must_fail(wrong, "constrained moves accept with 0.9 of the energy")]
+
+
 def acceptance(context: Context) -> Findings:
     """Each kind of move on independent draws from the free chain, and with wrong rules."""
     chain = _soft_chain()
@@ -151,7 +203,7 @@ def acceptance(context: Context) -> Findings:
             }
         )
         # An acceptance rule with another temperature, and one without the measure.
-        hot = replace(chain, persistence_length_A=0.9 * chain.persistence_length_A)
+        hot = replace(chain, persistence_length_A=_ENERGY_SHARE * chain.persistence_length_A)
         energy, energy_error, _, _ = _drift(chain, start, _moved(hot, start, moves, rng)[0])
         control = _judged(f"control: {moves.label}, energy", _ENERGY, energy, energy_error)
         results.append(must_fail(control, f"{moves.label} moves accept with 0.9 of the energy"))
@@ -160,6 +212,7 @@ def acceptance(context: Context) -> Findings:
             _, _, measure, measure_error = _drift(chain, start, end)
             control = _judged(f"control: {moves.label}, measure", _MEASURE, measure, measure_error)
             results.append(must_fail(control, f"{moves.label} moves forget the rotation measure"))
+    results += _closed_rings(context.seed)
     table = Table(
         "acceptance",
         "Metropolis moves on exact draws of a soft chain",
