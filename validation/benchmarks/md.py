@@ -41,11 +41,11 @@ def stable_rings(chain: Chain) -> list[DiscreteRing]:
 
 
 def half_soft(chain: Chain) -> Chain:
-    """The first half of the steps five times softer; roll coupled to tilt and twist everywhere."""
+    """The first half of the steps ten times softer; roll coupled to tilt and twist everywhere."""
     stiffness = chain.stiffness.copy()
     stiffness[:, 0, 1] = stiffness[:, 1, 0] = 0.2
     stiffness[:, 1, 2] = stiffness[:, 2, 1] = -0.15
-    stiffness[: chain.n_steps // 2] *= 0.2
+    stiffness[: chain.n_steps // 2] *= 0.1
     return replace(chain, name=f"{chain.name}, half soft", stiffness=stiffness)
 
 
@@ -227,7 +227,7 @@ def main() -> None:
     kind.add_argument("--fractions", type=float, nargs="+", default=[0.225, 0.45, 0.6, 0.9])
     kind = kinds.add_parser("fluctuation")
     kind.add_argument("molecule", nargs="?", default="11T15")
-    kind.add_argument("--half-soft", action="store_true", help="soften half of it five times")
+    kind.add_argument("--half-soft", action="store_true", help="soften half of it ten times")
     kind.add_argument("--samples", type=int, default=10000, help="of each of two replicas")
     kind.add_argument("--interval", type=int, default=45, help="time steps between two")
     kind.add_argument("--metropolis", type=int, default=60000, help="configurations in all")
