@@ -130,8 +130,10 @@ def closure_jacobian(centres: Any, axes: Any, out: Any) -> None:
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
-def lagrangian_residual(gradient: Any, centres: Any, axes: Any, multipliers: Any) -> float:
-    """Largest entry of gradient + (closure Jacobian)^T multipliers, reduced units."""
+def lagrangian_gradient(
+    gradient: Any, centres: Any, axes: Any, multipliers: Any, out: Any
+) -> float:
+    """Gradient + (closure Jacobian)^T multipliers into ``out`` (N, 3); returns the largest."""
     n = axes.shape[0]
     f0, f1, f2 = multipliers[0], multipliers[1], multipliers[2]
     worst = 0.0
@@ -145,6 +147,7 @@ def lagrangian_residual(gradient: Any, centres: Any, axes: Any, multipliers: Any
         m2 = x * f1 - y * f0 + multipliers[5]
         for j in range(3):
             g = gradient[s, j] + axes[s, j, 0] * m0 + axes[s, j, 1] * m1 + axes[s, j, 2] * m2
+            out[s, j] = g
             if not abs(g) <= worst:
                 worst = abs(g)
     return worst

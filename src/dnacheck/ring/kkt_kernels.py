@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from dnacheck.ring.closure_kernels import lagrangian_gradient
 from dnacheck.ring.schur_kernels import solve_small
 from dnacheck.ring.step_kernels import accumulated_turn
 from dnacheck.ring.sweep_kernels import back_substitute, eliminate, factorise
@@ -27,9 +28,14 @@ def solve_kkt(
     multipliers: Any,
     factors: Any,
     small: Any,
-    target: Any,
+    slope: Any,
+    change: Any,
 ) -> tuple[int, float, float]:
-    """Factorise the KKT matrix with a shift and solve for the new multipliers.
+    """Factorise the KKT matrix with a shift and solve for the ``change`` (6,) of the multipliers.
+
+    The right-hand side is the gradient of the Lagrangian, left in ``slope`` (N, 3). Solving for
+    changes keeps the error relative to them where a pivot of H happens to be tiny; the multipliers
+    themselves would carry it into every iteration.
 
     Returns
     -------
@@ -38,13 +44,14 @@ def solve_kkt(
     weakest : see :func:`dnacheck.ring.sweep_kernels.factorise`.
     """
     _, centres, _, axes, halves, gradient, closure = state
+    lagrangian_gradient(gradient, centres, axes, multipliers, slope)
     pivots, log_pivots, weakest = factorise(
-        gradient, stiffness, shift, form, centres, axes, halves, multipliers, factors, small
+        slope, stiffness, shift, form, centres, axes, halves, multipliers, factors, small
     )
     rhs = np.empty(6)
     for i in range(6):
         rhs[i] = closure[i] - small[i, 6]
-    small_negatives, log_small = solve_small(small, rhs, float(axes.shape[0]), target)
+    small_negatives, log_small = solve_small(small, rhs, float(axes.shape[0]), change)
     # The inertia of the KKT matrix is that of H and of minus the Schur complement.
     if small_negatives < 0:
         return -1, -math.inf, weakest
@@ -87,13 +94,14 @@ def positive_shift(
     multipliers: Any,
     factors: Any,
     small: Any,
-    target: Any,
+    slope: Any,
+    change: Any,
 ) -> float:
     """Smallest shift tried, from ``start`` on, that makes the projected Hessian positive; or -1."""
     shift = start
     for _ in range(MOST_SHIFTS):
         negatives, _, _ = solve_kkt(
-            state, stiffness, shift, form, multipliers, factors, small, target
+            state, stiffness, shift, form, multipliers, factors, small, slope, change
         )
         if negatives == 0:
             return shift

@@ -55,20 +55,25 @@ def _inspect(
     multipliers: Any,
     factors: Any,
     small: Any,
-    target: Any,
+    slope: Any,
+    change: Any,
     figures: Any,
 ) -> int:
     """Inertia and determinant at an equilibrium, into ``figures``.
 
     Returns the number of eigenvalues below -flat, or -1 if even a shift by ``flat`` is singular.
     """
-    below, _, _ = solve_kkt(state, stiffness, -flat, form, multipliers, factors, small, target)
+    below, _, _ = solve_kkt(
+        state, stiffness, -flat, form, multipliers, factors, small, slope, change
+    )
     negatives, log_det, weakest = solve_kkt(
-        state, stiffness, 0.0, form, multipliers, factors, small, target
+        state, stiffness, 0.0, form, multipliers, factors, small, slope, change
     )
     above = negatives
     if negatives != 0:
-        above, _, _ = solve_kkt(state, stiffness, flat, form, multipliers, factors, small, target)
+        above, _, _ = solve_kkt(
+            state, stiffness, flat, form, multipliers, factors, small, slope, change
+        )
     figures[NEGATIVES] = above
     figures[NEUTRAL] = below - above
     figures[LOG_DET_KKT] = log_det
@@ -109,6 +114,8 @@ def newton(
     factors = np.empty((n, FACTOR_WIDTH))
     small = np.empty((6, 7))
     step = np.empty((n, 3))
+    slope = np.empty((n, 3))
+    change = np.empty(6)
     target = np.empty(6)
     mean_bend = 0.0
     for s in range(n):
@@ -126,13 +133,13 @@ def newton(
         unknown = unknown and multipliers[i] == 0.0
     if unknown:
         negatives, _, _ = solve_kkt(
-            state, stiffness, 0.0, form, multipliers, factors, small, target
+            state, stiffness, 0.0, form, multipliers, factors, small, slope, change
         )
         if negatives >= 0:
-            multipliers[:] = target
+            multipliers[:] = change
     code = ITERATION_LIMIT
     for iteration in range(max_iterations + 1):
-        stationarity, worst = residuals(state, multipliers)
+        stationarity, worst = residuals(state, multipliers, slope)
         figures[ENERGY] = energy
         figures[RESIDUAL] = max(stationarity, worst)
         figures[CLOSURE] = worst
@@ -142,7 +149,7 @@ def newton(
             break
         if figures[RESIDUAL] <= tolerance:
             unstable = _inspect(
-                state, stiffness, flat, form, multipliers, factors, small, target, figures
+                state, stiffness, flat, form, multipliers, factors, small, slope, change, figures
             )
             code = CONVERGED if unstable >= 0 else SINGULAR
             if unstable <= 0 or not minima_only or escapes == _MOST_ESCAPES:
@@ -150,7 +157,7 @@ def newton(
             code = ITERATION_LIMIT
             escapes += 1
             shift = positive_shift(
-                state, stiffness, flat, unit, form, multipliers, factors, small, target
+                state, stiffness, flat, unit, form, multipliers, factors, small, slope, change
             )
             if shift < 0.0 or not least_stable(state[3], factors, small, step):
                 code = CONVERGED
@@ -167,10 +174,10 @@ def newton(
         turn = math.inf
         for attempt in range(MOST_SHIFTS):
             negatives, _, _ = solve_kkt(
-                state, stiffness, shift, form, multipliers, factors, small, target
+                state, stiffness, shift, form, multipliers, factors, small, slope, change
             )
             if negatives == 0 or (negatives > 0 and not minima_only):
-                back_substitute(factors, target, 1.0, step)
+                back_substitute(factors, change, 1.0, step)
                 turn = accumulated_turn(state[3], step)
                 if turn <= 2.0 * turn_cap or not minima_only or attempt >= 6:
                     break
@@ -180,6 +187,8 @@ def newton(
         if not math.isfinite(turn):
             code = SINGULAR
             break
+        for i in range(6):
+            target[i] = multipliers[i] + change[i]
         fraction, energy, ratio = line_search(
             state,
             trial,
@@ -201,7 +210,7 @@ def newton(
         elif ratio > 0.8:
             shift *= 0.25
         for i in range(6):
-            multipliers[i] += fraction * (target[i] - multipliers[i])
+            multipliers[i] += fraction * change[i]
         state, trial = trial, state
     angles[:] = state[0]
     return code

@@ -149,7 +149,9 @@ def _roll_energy(ground: Any, stiffness: Any, form: int, link: int, quadratic: A
     small = np.empty((6, 7))
     target = np.empty(6)
     step = np.empty((n, 3))
-    held = positive_shift(state, mean, _HELD * unit, unit, form, circle, factors, small, target)
+    held = positive_shift(
+        state, mean, _HELD * unit, unit, form, circle, factors, small, step, target
+    )
     if held < 0.0:
         return
     for i in range(2):

@@ -16,7 +16,7 @@ from dnacheck.model.chain_kernels import fill_angles
 from dnacheck.ring.closure_kernels import (
     closure_residual,
     energy_gradient,
-    lagrangian_residual,
+    lagrangian_gradient,
     linearise,
 )
 from dnacheck.ring.schur_kernels import solve_small
@@ -65,14 +65,14 @@ def evaluate(state: Any, ground: Any, stiffness: Any, form: int) -> float:
 
 
 @njit(cache=True, nogil=True)
-def residuals(state: Any, multipliers: Any) -> tuple[float, float]:
-    """Largest entry of the Lagrangian's gradient and of the closure residual."""
+def residuals(state: Any, multipliers: Any, slope: Any) -> tuple[float, float]:
+    """Largest entry of the Lagrangian's gradient, left in ``slope`` (N, 3), and of closure."""
     _, centres, _, axes, _, gradient, closure = state
     worst = 0.0
     for i in range(6):
         if not abs(closure[i]) <= worst:
             worst = abs(closure[i])
-    return lagrangian_residual(gradient, centres, axes, multipliers), worst
+    return lagrangian_gradient(gradient, centres, axes, multipliers, slope), worst
 
 
 @njit(cache=True, nogil=True)
@@ -239,7 +239,7 @@ def line_search(
             gain = energy - trial_energy + weight * (size - trial_size)
             accepted = gain >= 1e-4 * fraction * descent - noise
             if fraction == 1.0 and attempt == 0 and not accepted:
-                stationarity, worst = residuals(trial, target)
+                stationarity, worst = residuals(trial, target, mend)
                 # Below the noise of the energy only the residual can judge a step.
                 bound = 2.0 if turn < 1e-6 or descent < 10.0 * noise else 0.5
                 accepted = max(stationarity, worst) <= bound * residual
