@@ -191,7 +191,7 @@ GROUP = Group(
         Check("bead_chain.ensemble", "rings in thermal motion", ensemble, 70.0,
               ("thermal_energy",), applies=_shaken, requires=("dnacheck.md.check", "openmm")),
         Check("bead_chain.profile", "fluctuation along a molecule with one soft half", profile,
-              45.0, ("thermal_energy",), applies=_shaken,
+              45.0, ("thermal_energy",), Level.FULL, _shaken,
               requires=("dnacheck.md.check", "openmm")),
     ),
 )  # fmt: skip
