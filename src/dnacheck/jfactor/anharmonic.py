@@ -27,6 +27,7 @@ from dnacheck.jfactor.register import RegisterProfile, register_profile
 from dnacheck.jfactor.result import JFactor, JStatus, link_shares
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import InputError, SolveError
+from dnacheck.numerics.seeds import seed_sequence
 from dnacheck.ring.search import RingSearch
 
 Array = NDArray[np.float64]
@@ -101,9 +102,7 @@ class _Drawer:
         )
         weights = np.exp(masses - masses.max())
         self.shares = weights / weights.sum()
-        self.sequence = (
-            seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
-        )
+        self.sequence = seed_sequence(seed)
 
     def draw(self, pairs: int) -> Array:
         """Log-weights (pairs, scales, 2)."""

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from dnacheck.jfactor.fibre_kernels import follow
-from dnacheck.jfactor.slice_kernels import ROWS, draw_slice
+from dnacheck.jfactor.slice_kernels import draw_closed
 from dnacheck.model.chain_kernels import WEDGE
 
 
@@ -60,25 +60,8 @@ def scaled_log_weights(
     scaled = np.empty(m)
     flat_centre = centre.reshape(m)
     y = np.empty(6)
-    open_by = np.empty(ROWS)
     for pair in range(log_weights.shape[0]):
-        quadratic = 0.0
-        for s in range(n):
-            for k in range(3):
-                value = rng.standard_normal()
-                normals[s, k] = value
-                quadratic += value * value
-        draw_slice(right, z, root, normals, x)
-        for i in range(ROWS):
-            open_by[i] = 0.0
-            for k in range(m):
-                open_by[i] += rows[i, k] * draw[k]
-        for i in range(ROWS):
-            for j in range(ROWS):
-                quadratic -= open_by[i] * schur[i, j] * open_by[j]
-        for i in range(ROWS):
-            for k in range(m):
-                draw[k] -= open_by[i] * projector[i, k]
+        quadratic = draw_closed(rng, rows, right, z, root, projector, schur, normals, x)
         for index in range(scales.shape[0]):
             t = scales[index]
             for side in range(2):

@@ -20,6 +20,7 @@ from dnacheck.jfactor.register import RegisterProfile, register_laplace, registe
 from dnacheck.jfactor.result import JFactor, JStatus
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import InputError, SolveError
+from dnacheck.numerics.seeds import seed_sequence
 from dnacheck.ring.search import RingSearch, find_rings
 
 _PILOT_BATCHES = 8
@@ -105,7 +106,7 @@ def half_chains_to_tolerance(
     from dnacheck.jfactor.half_chain import HalfChainOptions, half_chain
 
     checked_tolerance(tolerance)
-    sequence = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
+    sequence = seed_sequence(seed)
     deadline = time.perf_counter() + max_seconds
     halves = _FIRST_HALVES
     best: JFactor | None = None
@@ -143,7 +144,7 @@ def metropolis_to_tolerance(
     from dnacheck.jfactor.umbrella import UmbrellaOptions, metropolis
 
     checked_tolerance(tolerance)
-    sequence = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
+    sequence = seed_sequence(seed)
     first, second = (np.random.default_rng(stream) for stream in sequence.spawn(2))
     pilot = UmbrellaOptions(samples=_FIRST_RECORDS, burn_in=16, threads=threads)
     began = time.perf_counter()

@@ -24,6 +24,7 @@ from dnacheck.jfactor.register import RegisterProfile, register_profile
 from dnacheck.jfactor.result import JFactor, JStatus, link_shares
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import InputError, SolveError
+from dnacheck.numerics.seeds import seed_sequence
 from dnacheck.numerics.statistics import batch_error, summarise_weights
 from dnacheck.ring.search import RingSearch
 
@@ -139,9 +140,7 @@ class ClosureSampler:
         masses = np.array([piece.log_mass for piece in self.slices])
         self.log_laplace = float(np.logaddexp.reduce(masses))
         self.cumulative = np.cumsum(np.exp(masses - self.log_laplace))
-        self.sequence = (
-            seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
-        )
+        self.sequence = seed_sequence(seed)
         self.probe_mean, self.probe_root = np.zeros(6), np.zeros((6, 6))
         self._set_probe_starts()
 

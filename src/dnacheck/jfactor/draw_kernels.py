@@ -20,7 +20,7 @@ import numpy as np
 from numba import njit
 
 from dnacheck.jfactor.fibre_kernels import follow, newton_fibre, same_solution
-from dnacheck.jfactor.slice_kernels import ROWS, draw_slice
+from dnacheck.jfactor.slice_kernels import dot, draw_closed
 from dnacheck.model.chain_kernels import WEDGE
 from dnacheck.ring.topology_kernels import link_of_ring
 
@@ -49,14 +49,6 @@ def _energy(angles: Any, ground: Any, stiffness: Any) -> float:
         energy += 0.5 * (k[0, 0] * x0 * x0 + k[1, 1] * x1 * x1 + k[2, 2] * x2 * x2)
         energy += k[0, 1] * x0 * x1 + k[0, 2] * x0 * x2 + k[1, 2] * x1 * x2
     return energy
-
-
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
-def _dot(a: Any, b: Any) -> float:
-    total = 0.0
-    for k in range(a.shape[0]):
-        total += a[k] * b[k]
-    return total
 
 
 @njit(cache=True, nogil=True)
@@ -95,7 +87,7 @@ def _log_weight(
     rivals: Any,
 ) -> tuple[float, int, int]:
     """Log-weight of a shape, what became of it, and its link."""
-    found = _dot(direction.reshape(angles.size), angles.reshape(angles.size))
+    found = dot(direction.reshape(angles.size), angles.reshape(angles.size))
     if not found > 0.0:
         return -math.inf, OTHER_SIDE, NO_LINK
     shape_link = link_of_ring(centres, frames)[0]
@@ -180,26 +172,9 @@ def draw_pairs(
     flat_centre = centre.reshape(m)
     y = np.empty(6)
     trial = np.empty(6)
-    open_by = np.empty(ROWS)
     unfinished = 0
     for pair in range(pairs):
-        quadratic = 0.0
-        for s in range(n):
-            for k in range(3):
-                value = rng.standard_normal()
-                normals[s, k] = value
-                quadratic += value * value
-        draw_slice(right, z, root, normals, x)
-        for i in range(ROWS):
-            open_by[i] = _dot(rows[i], draw)
-        for i in range(ROWS):
-            for j in range(ROWS):
-                quadratic -= open_by[i] * schur[i, j] * open_by[j]
-        for i in range(ROWS):
-            c = open_by[i]
-            b = projector[i]
-            for k in range(m):
-                draw[k] -= c * b[k]
+        quadratic = draw_closed(rng, rows, right, z, root, projector, schur, normals, x)
         for side in range(2):
             if side == 1:
                 for k in range(m):

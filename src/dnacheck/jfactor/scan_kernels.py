@@ -10,15 +10,8 @@ from numba import njit
 
 from dnacheck.model.chain_kernels import fill_frames
 from dnacheck.ring.closure_kernels import energy_gradient
-from dnacheck.ring.newton_kernels import (
-    CONVERGED,
-    ENERGY,
-    LOG_DET_KKT,
-    N_FIGURES,
-    NEGATIVES,
-    NEUTRAL,
-    newton,
-)
+from dnacheck.ring.newton_kernels import ENERGY, LOG_DET_KKT, N_FIGURES, NEUTRAL
+from dnacheck.ring.search_kernels import minimum_from_circle
 from dnacheck.ring.start_kernels import circle_registers, fill_circle
 from dnacheck.ring.topology_kernels import link_of_ring
 
@@ -91,24 +84,19 @@ def scan_molecule(
             register = (
                 rests[i, round_] if round_ < 2 else rests[i, 0] + 0.5 * math.pi * (round_ - 1)
             )
-            fill_circle(ground, form, links[i], register, trial)
-            for j in range(6):
-                force[j] = 0.0
-            for j in range(N_FIGURES):
-                figure[j] = 0.0
-            code = newton(
-                trial,
-                force,
+            if not minimum_from_circle(
                 ground,
                 stiffness,
                 form,
+                links[i],
+                register,
                 _TOLERANCE,
                 _MOST_ITERATIONS,
                 _TURN_CAP,
-                True,
+                trial,
+                force,
                 figure,
-            )
-            if code != CONVERGED or figure[NEGATIVES] != 0:
+            ):
                 failed += 1
                 continue
             known = False

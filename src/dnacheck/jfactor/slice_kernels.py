@@ -302,3 +302,51 @@ def draw_slice(right: Any, z: Any, root: Any, normals: Any, out: Any) -> None:
         f5 += r[0, 5] * w0 + r[1, 5] * w1 + r[2, 5] * w2
         f6 += r[0, 6] * w0 + r[1, 6] * w1 + r[2, 6] * w2
         out[s, 0], out[s, 1], out[s, 2] = w0, w1, w2
+
+
+@njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
+def dot(a: Any, b: Any) -> float:
+    """Inner product of two vectors."""
+    total = 0.0
+    for k in range(a.shape[0]):
+        total += a[k] * b[k]
+    return total
+
+
+@njit(cache=True, nogil=True)
+def draw_closed(
+    rng: Any,
+    rows: Any,
+    right: Any,
+    z: Any,
+    root: Any,
+    projector: Any,
+    schur: Any,
+    normals: Any,
+    out: Any,
+) -> float:
+    """Draw x (N, 3) from the slice's Gaussian under closure to first order; x^T H x returns.
+
+    The arrays are as filled by :func:`dnacheck.jfactor.register_kernels.hold`; ``normals`` (N, 3)
+    is left with the standard normals that were drawn.
+    """
+    quadratic = 0.0
+    for s in range(normals.shape[0]):
+        for k in range(3):
+            value = rng.standard_normal()
+            normals[s, k] = value
+            quadratic += value * value
+    draw_slice(right, z, root, normals, out)
+    flat = out.reshape(out.size)
+    open_by = np.empty(ROWS)
+    for i in range(ROWS):
+        open_by[i] = dot(rows[i], flat)
+    for i in range(ROWS):
+        for j in range(ROWS):
+            quadratic -= open_by[i] * schur[i, j] * open_by[j]
+    for i in range(ROWS):
+        c = open_by[i]
+        b = projector[i]
+        for k in range(flat.shape[0]):
+            flat[k] -= c * b[k]
+    return quadratic

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from dnacheck.ring.closure_kernels import lagrangian_gradient
 from dnacheck.ring.schur_kernels import solve_small
 from dnacheck.ring.step_kernels import accumulated_turn
 from dnacheck.ring.sweep_kernels import back_substitute, eliminate, factorise
@@ -33,8 +32,8 @@ def solve_kkt(
 ) -> tuple[int, float, float]:
     """Factorise the KKT matrix with a shift and solve for the ``change`` (6,) of the multipliers.
 
-    The right-hand side is the gradient of the Lagrangian, left in ``slope`` (N, 3). Solving for
-    changes keeps the error relative to them where a pivot of H happens to be tiny; the multipliers
+    The right-hand side is ``slope`` (N, 3), the gradient of the Lagrangian. Solving for changes
+    keeps the error relative to them where a pivot of H happens to be tiny; the multipliers
     themselves would carry it into every iteration.
 
     Returns
@@ -43,8 +42,7 @@ def solve_kkt(
     log_det : log |det KKT|, minus infinity if it is singular.
     weakest : see :func:`dnacheck.ring.sweep_kernels.factorise`.
     """
-    _, centres, _, axes, halves, gradient, closure = state
-    lagrangian_gradient(gradient, centres, axes, multipliers, slope)
+    _, centres, _, axes, halves, _, closure = state
     pivots, log_pivots, weakest = factorise(
         slope, stiffness, shift, form, centres, axes, halves, multipliers, factors, small
     )

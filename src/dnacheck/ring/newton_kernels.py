@@ -132,6 +132,7 @@ def newton(
     for i in range(6):
         unknown = unknown and multipliers[i] == 0.0
     if unknown:
+        residuals(state, multipliers, slope)
         negatives, _, _ = solve_kkt(
             state, stiffness, 0.0, form, multipliers, factors, small, slope, change
         )

@@ -42,6 +42,42 @@ def _known(trial: Any, energy: float, neutral: bool, found: int, angles: Any, fi
     return False
 
 
+@njit(cache=True, nogil=True)
+def minimum_from_circle(
+    ground: Any,
+    stiffness: Any,
+    form: int,
+    link: int,
+    register: float,
+    tolerance: float,
+    max_iterations: int,
+    turn_cap: float,
+    angles: Any,
+    multipliers: Any,
+    figures: Any,
+) -> bool:
+    """Whether the planar ring of a link and register leads to a minimum.
+
+    It fills ``angles`` (N, 3), ``multipliers`` (6,) and ``figures`` (8,); see :func:`newton`.
+    """
+    fill_circle(ground, form, link, register, angles)
+    multipliers[:] = 0.0
+    figures[:] = 0.0
+    code = newton(
+        angles,
+        multipliers,
+        ground,
+        stiffness,
+        form,
+        tolerance,
+        max_iterations,
+        turn_cap,
+        True,
+        figures,
+    )
+    return code == CONVERGED and figures[NEGATIVES] == 0
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def search(
     ground: Any,
@@ -86,26 +122,23 @@ def search(
             if round_ == 1 and counts[i] < 2:
                 continue
             register = rests[i, round_] if round_ < 2 else rests[i, 0] + registers[round_ - 2]
-            fill_circle(ground, form, links[i], register, trial)
-            force[:] = 0.0
-            figure[:] = 0.0
             starts += 1
-            code = newton(
-                trial,
-                force,
+            if not minimum_from_circle(
                 ground,
                 stiffness,
                 form,
+                links[i],
+                register,
                 tolerance,
                 max_iterations,
                 turn_cap,
-                True,
+                trial,
+                force,
                 figure,
-            )
-            neutral = figure[NEUTRAL] > 0.0
-            if code != CONVERGED or figure[NEGATIVES] != 0:
+            ):
                 failed += 1
                 continue
+            neutral = figure[NEUTRAL] > 0.0
             energies[i] = min(energies[i], figure[ENERGY])
             lowest = min(lowest, figure[ENERGY])
             if found < angles.shape[0] and not _known(

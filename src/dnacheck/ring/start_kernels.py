@@ -150,7 +150,7 @@ def _roll_energy(ground: Any, stiffness: Any, form: int, link: int, quadratic: A
     target = np.empty(6)
     step = np.empty((n, 3))
     held = positive_shift(
-        state, mean, _HELD * unit, unit, form, circle, factors, small, step, target
+        state, mean, _HELD * unit, unit, form, circle, factors, small, gradient, target
     )
     if held < 0.0:
         return

@@ -14,6 +14,7 @@ from numba import njit
 
 from dnacheck.model.chain_kernels import fill_angles
 from dnacheck.ring.closure_kernels import (
+    closure_jacobian,
     closure_residual,
     energy_gradient,
     lagrangian_gradient,
@@ -156,29 +157,23 @@ def restore(state: Any, stiffness: Any, defect: Any, mend: Any) -> bool:
     """
     _, centres, _, axes, _, _, _ = state
     n = axes.shape[0]
+    jacobian = np.empty((6, 3 * n))
+    closure_jacobian(centres, axes, jacobian)
     metric = np.zeros((6, 7))
-    column = np.empty(6)
     weights = np.empty(6)
-    for round_ in range(2):
-        for s in range(n):
-            x = centres[n, 0] - centres[s + 1, 0]
-            y = centres[n, 1] - centres[s + 1, 1]
-            z = centres[n, 2] - centres[s + 1, 2]
-            for j in range(3):
-                a0, a1, a2 = axes[s, j, 0], axes[s, j, 1], axes[s, j, 2]
-                column[0], column[1], column[2] = a1 * z - a2 * y, a2 * x - a0 * z, a0 * y - a1 * x
-                column[3], column[4], column[5] = a0, a1, a2
-                soft = 1.0 / stiffness[s, j, j]
-                if round_ == 0:
-                    for i in range(6):
-                        for k in range(6):
-                            metric[i, k] += soft * column[i] * column[k]
-                else:
-                    mend[s, j] = 0.0
-                    for i in range(6):
-                        mend[s, j] -= soft * column[i] * weights[i]
-        if round_ == 0 and solve_small(metric, defect, float(n), weights)[0] < 0:
-            return False
+    for s in range(n):
+        for j in range(3):
+            for i in range(6):
+                pull = jacobian[i, 3 * s + j] / stiffness[s, j, j]
+                for k in range(6):
+                    metric[i, k] += pull * jacobian[k, 3 * s + j]
+    if solve_small(metric, defect, float(n), weights)[0] < 0:
+        return False
+    for s in range(n):
+        for j in range(3):
+            mend[s, j] = 0.0
+            for i in range(6):
+                mend[s, j] -= jacobian[i, 3 * s + j] * weights[i] / stiffness[s, j, j]
     return True
 
 

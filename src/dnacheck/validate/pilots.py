@@ -13,8 +13,14 @@ from dnacheck.validate.verdict import CheckResult, Rule, judge
 
 if TYPE_CHECKING:
     from dnacheck.model.chain import Chain
+    from dnacheck.ring.continuum import ContinuumOptions
 
 USED = "the shortest, median and longest molecule"
+VARIANT_COLUMNS = (
+    Column("name", "Molecule"),
+    Column("angles", "Angles"),
+    Column("ratio", "K_3/K_1", "", "g"),
+)
 _REPEATS = 3
 _SLOW_S = 0.5
 """Work slower than this is not repeated."""
@@ -42,6 +48,29 @@ def pilots(chains: Sequence[Chain]) -> list[Chain]:
     ordered = sorted(chains, key=lambda chain: (chain.n_steps, chain.name))
     picks = {0, len(ordered) // 2, len(ordered) - 1}
     return [ordered[index] for index in sorted(picks)]
+
+
+def first_pilots(variants: Sequence[tuple[str, float, Chain]]) -> list[Chain]:
+    """The pilots among the molecules at the scene's first twist ratio; see :func:`variants_of`."""
+    return pilots([chain for _, ratio, chain in variants if ratio == variants[0][1]])
+
+
+def mesh_candidates(
+    compute: Callable[[ContinuumOptions], Callable[[Chain], float]],
+    meshes: Sequence[tuple[int, int]],
+) -> list[Candidate]:
+    """A quantity on fixed meshes (intervals, degree), coarse ones first, and on an adapted one."""
+    from dnacheck.ring.continuum import ContinuumOptions
+
+    fixed = [
+        Candidate(
+            f"{intervals} intervals of degree {degree}",
+            compute(ContinuumOptions(intervals=intervals, degree=degree, adapt=False)),
+        )
+        for intervals, degree in meshes
+    ]
+    adapted = compute(ContinuumOptions(energy_tolerance=1e-8))
+    return [*fixed, Candidate("mesh adapted to 1e-8", adapted)]
 
 
 def choose(

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 from dnacheck.validate.context import Context
 from dnacheck.validate.pilots import (
     USED,
+    VARIANT_COLUMNS,
     Candidate,
     choose,
+    first_pilots,
     judge_accuracy,
+    mesh_candidates,
     pilot_table,
-    pilots,
     variants_of,
 )
 from dnacheck.validate.registry import Findings
@@ -40,7 +42,6 @@ def energy(context: Context) -> Findings:
     variants = variants_of(context)
     options = rings.rod_options(context.scene)
     fine = SearchOptions(newton=NewtonOptions(tolerance=1e-12))
-    ratio = variants[0][1]
 
     def by_rod(chain: Chain) -> float:
         return lowest_continuum_ring(build_rod(chain, options)).lowest.energy
@@ -51,7 +52,7 @@ def energy(context: Context) -> Findings:
             Candidate("continuum rod", by_rod),
         ],
         lambda chain: find_rings(chain, fine).lowest.energy,
-        pilots([chain for _, at, chain in variants if at == ratio]),
+        first_pilots(variants),
         accuracy,
     )
     rows, unsolved = [], []
@@ -146,12 +147,6 @@ def _control(chain: Chain, accuracy: float) -> CheckResult:
     )
 
 
-def _mesh(intervals: int, degree: int) -> ContinuumOptions:
-    from dnacheck.ring.continuum import ContinuumOptions
-
-    return ContinuumOptions(intervals=intervals, degree=degree, adapt=False)
-
-
 def continuum_energy(context: Context) -> Findings:
     """Ring energies of the continuum rod, on the coarsest mesh that suffices."""
     from dnacheck.ring.continuum import ContinuumOptions, lowest_continuum_ring
@@ -168,17 +163,10 @@ def continuum_energy(context: Context) -> Findings:
 
         return lowest
 
-    candidates = [
-        Candidate(f"{k} intervals of degree {m}", compute(_mesh(k, m)))
-        for k, m in ((15, 3), (20, 4), (30, 4), (30, 6))
-    ]
-    candidates.append(
-        Candidate("mesh adapted to 1e-8", compute(ContinuumOptions(energy_tolerance=1e-8)))
-    )
     chosen = choose(
-        candidates,
+        mesh_candidates(compute, ((15, 3), (20, 4), (30, 4), (30, 6))),
         compute(ContinuumOptions(energy_tolerance=0.01 * accuracy, degree=6)),
-        pilots([chain for _, at, chain in variants if at == variants[0][1]]),
+        first_pilots(variants),
         accuracy,
     )
     results = [
@@ -199,9 +187,7 @@ def continuum_energy(context: Context) -> Findings:
         "continuum-energies",
         "Continuum ring energies",
         [
-            Column("name", "Molecule"),
-            Column("angles", "Angles"),
-            Column("ratio", "K_3/K_1", "", "g"),
+            *VARIANT_COLUMNS,
             Column("energy", "Energy", "RT", ".4f"),
         ],
         rows[:SHOWN_ROWS],

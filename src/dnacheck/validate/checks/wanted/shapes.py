@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 from dnacheck.validate.context import Context
 from dnacheck.validate.pilots import (
     USED,
-    Candidate,
+    VARIANT_COLUMNS,
     choose,
+    first_pilots,
     judge_accuracy,
+    mesh_candidates,
     pilot_table,
-    pilots,
     variants_of,
 )
 from dnacheck.validate.registry import Findings
@@ -44,20 +45,10 @@ def shape(context: Context) -> Findings:
 
         return distance
 
-    candidates = [
-        Candidate(
-            f"{k} intervals of degree {m}",
-            compute(ContinuumOptions(intervals=k, degree=m, adapt=False)),
-        )
-        for k, m in ((15, 3), (20, 4), (30, 6))
-    ]
-    candidates.append(
-        Candidate("mesh adapted to 1e-8", compute(ContinuumOptions(energy_tolerance=1e-8)))
-    )
     chosen = choose(
-        candidates,
+        mesh_candidates(compute, ((15, 3), (20, 4), (30, 6))),
         compute(ContinuumOptions(energy_tolerance=1e-10, degree=6)),
-        pilots([chain for _, at, chain in variants if at == variants[0][1]]),
+        first_pilots(variants),
         accuracy,
         relative=False,
     )
@@ -74,9 +65,7 @@ def shape(context: Context) -> Findings:
         "shapes",
         "Distance between the discrete and the continuum ring",
         [
-            Column("name", "Molecule"),
-            Column("angles", "Angles"),
-            Column("ratio", "K_3/K_1", "", "g"),
+            *VARIANT_COLUMNS,
             Column("rms", "rms distance", "Å", ".2f"),
         ],
         rows[:SHOWN_ROWS],

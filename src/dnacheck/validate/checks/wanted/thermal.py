@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING
 from dnacheck.validate.context import Context
 from dnacheck.validate.pilots import (
     USED,
+    VARIANT_COLUMNS,
     Candidate,
     choose,
+    first_pilots,
     judge_accuracy,
     pilot_table,
-    pilots,
     variants_of,
 )
 from dnacheck.validate.registry import Findings
@@ -69,7 +70,7 @@ def thermal_energy(context: Context) -> Findings:
     accuracy = context.scene.wanted.thermal_energy
     assert accuracy is not None
     variants = variants_of(context)
-    used = pilots([chain for _, at, chain in variants if at == variants[0][1]])
+    used = first_pilots(variants)
     tolerance = max(0.1 * accuracy * used[0].n_steps * STIFFENING, _FINEST_LN_J)
     reference = {
         id(chain): sampled(chain, min(tolerance, _LN_J_TOLERANCE), context.seed + index)
@@ -135,9 +136,7 @@ def thermal_energy(context: Context) -> Findings:
         "thermal",
         "Mean elastic energies of the rings at temperature",
         [
-            Column("name", "Molecule"),
-            Column("angles", "Angles"),
-            Column("ratio", "K_3/K_1", "", "g"),
+            *VARIANT_COLUMNS,
             Column("lowest", "at rest", "RT", ".2f"),
             Column("mean", "mean", "RT", ".2f"),
             Column("sampled", "pilot", "RT", ".2f", "", "From the derivative of ln J"),
