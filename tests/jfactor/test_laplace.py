@@ -114,3 +114,15 @@ def test_json_has_the_promised_members():
 def test_link_shares_are_sorted_and_leave_out_nothing_but_zero():
     shares = link_shares({3: -5.0, 4: -2.0, 5: -math.inf})
     assert [share.link for share in shares] == [4, 3]
+
+
+def test_the_stiffness_itself_counts_not_the_ratio_it_was_made_from():
+    """Stiffening by c shifts ln J by the known powers of c; the label of the ratio is idle."""
+    chain = build_chain(embedded("09T15"))
+    stiffer = replace(chain, stiffness=1.05 * chain.stiffness)
+    unlabelled = replace(stiffer, twist_ratio=None)
+    assert laplace(stiffer).minus_lnJ == pytest.approx(laplace(unlabelled).minus_lnJ, abs=1e-9)
+    # E and 3 ln c of the six closure conditions are all that changes in Laplace's formula.
+    rise = 0.05 * find_rings(chain).lowest.energy_RT - 3.0 * math.log(1.05)
+    single = laplace_log_j(find_rings(chain).lowest) - laplace_log_j(find_rings(stiffer).lowest)
+    assert single == pytest.approx(rise, abs=1e-6)

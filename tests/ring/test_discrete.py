@@ -263,3 +263,15 @@ def test_starts_that_are_not_finite_are_refused(bad):
 def test_options_are_checked(kwargs):
     with pytest.raises(InputError):
         NewtonOptions(**kwargs)
+
+
+def test_a_tiny_pivot_of_the_hessian_does_not_stall_the_iteration():
+    """At this ratio a pivot of the unprojected Hessian happens to be tiny (a sweep fell over it)."""
+    chain = build_chain(embedded("08A17"), "trifonov")
+    near = find_rings(chain.with_twist_ratio(0.5 + 7.0 / 15.0)).lowest
+    there = chain.with_twist_ratio(0.5 + 8.0 / 15.0)
+    ring = solve_ring(there, near.angles)
+    assert ring.residual < 1e-10
+    assert ring.iterations <= 6
+    assert ring.link == near.link == 15
+    assert ring.energy == pytest.approx(find_rings(there).lowest.energy, rel=1e-9)
