@@ -266,7 +266,7 @@ def test_options_are_checked(kwargs):
 
 
 def test_a_tiny_pivot_of_the_hessian_does_not_stall_the_iteration():
-    """At this ratio a pivot of the unprojected Hessian happens to be tiny (a sweep fell over it)."""
+    """At this ratio a pivot of the unprojected Hessian is tiny by chance."""
     chain = build_chain(embedded("08A17"), "trifonov")
     near = find_rings(chain.with_twist_ratio(0.5 + 7.0 / 15.0)).lowest
     there = chain.with_twist_ratio(0.5 + 8.0 / 15.0)
