@@ -59,8 +59,8 @@ def rotations():
 
 
 def discrete_rings():
-    from dnacheck.ring.discrete import NewtonOptions, solve_ring
-    from dnacheck.ring.search import SearchOptions, find_rings
+    from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
+    from dnacheck.equilibria.discrete.solve import NewtonOptions, solve_ring
 
     numbers = []
     straight = molecule("A" * 42)
@@ -80,9 +80,9 @@ def discrete_rings():
 
 
 def topology():
+    from dnacheck.equilibria.discrete.search import find_rings
     from dnacheck.md.writhe_kernels import fill_writhe
-    from dnacheck.ring.search import find_rings
-    from dnacheck.ring.topology_kernels import fuller_writhe, polygon_writhe
+    from dnacheck.numerics.curve_topology import fuller_writhe, polygon_writhe
 
     ring = find_rings(molecule()).lowest
     out = np.empty(1)
@@ -94,8 +94,8 @@ def topology():
 
 
 def continuum_rings():
-    from dnacheck.ring.continuum import ContinuumOptions, lowest_continuum_ring
-    from dnacheck.ring.reconstruct import reconstruct
+    from dnacheck.equilibria.bridge.reconstruct import reconstruct
+    from dnacheck.equilibria.continuum import ContinuumOptions, lowest_continuum_ring
 
     rod = build_rod(molecule(), ROD)
     found = lowest_continuum_ring(rod, options=ContinuumOptions(energy_tolerance=1e-5)).lowest
@@ -105,14 +105,14 @@ def continuum_rings():
 
 
 def families():
-    from dnacheck.ring.continuation import Bounds, ContinuationOptions
-    from dnacheck.ring.continuation.diagram import (
+    from dnacheck.equilibria.continuation import Bounds, ContinuationOptions
+    from dnacheck.equilibria.continuation.diagram import (
         imperfect_component,
         perfect_diagram,
         ratio_branch,
     )
-    from dnacheck.ring.continuation.parameters import perfect_rod
-    from dnacheck.ring.continuum import lowest_continuum_ring
+    from dnacheck.equilibria.continuation.parameters import perfect_rod
+    from dnacheck.equilibria.continuum import lowest_continuum_ring
 
     rod = build_rod(molecule(), ROD)
     ring = lowest_continuum_ring(rod).lowest
@@ -131,7 +131,7 @@ def families():
 
 
 def sweeps():
-    from dnacheck.ring.sweep import sweep_continuum, sweep_discrete
+    from dnacheck.equilibria.continuation.twist_ratio import sweep_continuum, sweep_discrete
 
     chain = molecule()
     ratios = np.array([1.4, 1.45, 1.5])
@@ -141,10 +141,14 @@ def sweeps():
 
 
 def laplace_and_registers():
-    from dnacheck.jfactor.anharmonic import AnharmonicOptions, anharmonic_term
-    from dnacheck.jfactor.closure_sampling import ClosureOptions, ClosureSampler
-    from dnacheck.jfactor.laplace import laplace
-    from dnacheck.jfactor.register import RegisterOptions, register_laplace, register_profile
+    from dnacheck.cyclization.closure.sampling import ClosureOptions, ClosureSampler
+    from dnacheck.cyclization.laplace.anharmonic import AnharmonicOptions, anharmonic_term
+    from dnacheck.cyclization.laplace.isolated import laplace
+    from dnacheck.cyclization.laplace.register import (
+        RegisterOptions,
+        register_laplace,
+        register_profile,
+    )
 
     numbers = []
     for chain in (molecule(), full_chain()):
@@ -161,7 +165,7 @@ def laplace_and_registers():
 
 
 def scan():
-    from dnacheck.jfactor.scan import scan_row
+    from dnacheck.scan.scan import scan_row
 
     arguments = {"angles": "trifonov", "persistence_length_A": 300.0}
     rows = [scan_row("a", LETTERS, arguments), scan_row("b", "A" * 42, arguments)]
@@ -169,21 +173,21 @@ def scan():
 
 
 def half_chains():
-    from dnacheck.jfactor.half_chain import HalfChainOptions, half_chain
-    from dnacheck.ring.search import find_rings
+    from dnacheck.cyclization.half_chain.sampling import HalfChainOptions, half_chain
+    from dnacheck.equilibria.discrete.search import find_rings
 
     options = HalfChainOptions(halves=400, batches=4, radius=2.0)
     return [half_chain(find_rings(full_chain()), options, np.random.default_rng(3)).minus_lnJ]
 
 
 def metropolis():
-    from dnacheck.jfactor.metropolis import (
+    from dnacheck.cyclization.ensembles.metropolis import (
         ClosedRingOptions,
         closed_ring_ensemble,
         sample_free_chain,
     )
-    from dnacheck.jfactor.umbrella import UmbrellaOptions, umbrella_estimate
-    from dnacheck.ring.search import find_rings
+    from dnacheck.cyclization.umbrella.sampling import UmbrellaOptions, umbrella_estimate
+    from dnacheck.equilibria.discrete.search import find_rings
 
     chain = full_chain(12)
     options = UmbrellaOptions(

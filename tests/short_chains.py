@@ -6,8 +6,8 @@ import functools
 
 import numpy as np
 
+from dnacheck.equilibria.discrete.kernels.starts import fill_circle
 from dnacheck.model.chain import Chain, uniform_stiffness
-from dnacheck.ring.start_kernels import fill_circle
 
 
 @functools.cache

@@ -33,8 +33,8 @@ def test_kernels_import_nothing_of_ours_but_numerics_and_kernels(graph):
     ("imported", "allowed"),
     [
         ("dnacheck.numerics.rotations", True),
-        ("dnacheck.ring.closure_kernels", True),
-        ("dnacheck.jfactor.kernels.walk", True),
+        ("dnacheck.equilibria.discrete.kernels.closure", True),
+        ("dnacheck.cyclization.kernels.walk", True),
         ("dnacheck.model.chain", False),
         ("dnacheck.model.kernelsmith", False),
     ],

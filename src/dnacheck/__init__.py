@@ -1,8 +1,8 @@
 """Elastic DNA rings: discrete wedge chains and continuum rods, each checked against the other.
 
 Importing the package is cheap on purpose; numerical libraries are loaded by the subpackages that
-need them: :mod:`dnacheck.numerics`, :mod:`dnacheck.model`, :mod:`dnacheck.ring`,
-:mod:`dnacheck.jfactor`, :mod:`dnacheck.md` and :mod:`dnacheck.validate`.
+need them: :mod:`dnacheck.numerics`, :mod:`dnacheck.model`, :mod:`dnacheck.equilibria`,
+:mod:`dnacheck.cyclization`, :mod:`dnacheck.md` and :mod:`dnacheck.validate`.
 """
 
 __all__ = ["__version__"]

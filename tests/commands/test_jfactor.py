@@ -77,7 +77,7 @@ def test_time_runs_out_for_every_sampler(capsys, method):
 
 
 def test_a_molecule_without_a_stable_ring_is_said(capsys, monkeypatch):
-    from dnacheck.ring import search
+    from dnacheck.equilibria.discrete import search
 
     def nothing(chain, options=None):
         found = find_rings(chain, options)
@@ -85,7 +85,7 @@ def test_a_molecule_without_a_stable_ring_is_said(capsys, monkeypatch):
 
     find_rings = search.find_rings
     monkeypatch.setattr(search, "find_rings", nothing)
-    monkeypatch.setattr("dnacheck.jfactor.register._seeds", lambda found: {})
+    monkeypatch.setattr("dnacheck.cyclization.laplace.register._seeds", lambda found: {})
     for method in ("auto", "laplace", "closure", "half-chain", "metropolis"):
         code, out, err = run(capsys, "jfactor", "08T15", "--method", method)
         assert code == 3, method

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dnacheck import cli
-from dnacheck.md.structure_file import write_ring_structure
+from dnacheck.io.structure import write_ring_structure
 from dnacheck.model.chain import build_chain, chain_frames
 from dnacheck.model.molecules import embedded
 from dnacheck.numerics.outcome import InputError

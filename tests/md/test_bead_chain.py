@@ -7,11 +7,11 @@ import pytest
 from bead_chains import coupled_stiffness, ring_chain
 from rods import ELEVEN, molecule_chain
 
+from dnacheck.equilibria.discrete.search import find_rings
 from dnacheck.md.bead_chain import BeadChain, BeadEnergy, BeadOptions, sabotaged
 from dnacheck.md.geometry import elastic_energies_RT, frames_of_beads, planar_ring, step_angles
 from dnacheck.model.chain import Chain, uniform_stiffness
 from dnacheck.numerics.outcome import InputError
-from dnacheck.ring.search import find_rings
 
 
 def shaken_ring(chain, seed=0):

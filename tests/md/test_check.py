@@ -5,12 +5,12 @@ import pytest
 from bead_chains import ring_chain
 from rods import molecule_chain
 
+from dnacheck.equilibria.discrete.search import find_rings
 from dnacheck.md.bead_chain import sabotaged
 from dnacheck.md.check import MdOptions, run_md_check
 from dnacheck.md.ensemble import EnsembleOptions
 from dnacheck.md.findings import Finding
 from dnacheck.numerics.outcome import InputError, Status
-from dnacheck.ring.search import find_rings
 
 ENERGIES_ONLY = MdOptions(minimise=None, ensemble=None)
 

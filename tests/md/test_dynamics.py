@@ -217,8 +217,8 @@ def test_the_measure_of_frames_stiffens_theta():
 @pytest.mark.md
 def test_half_the_time_step_leaves_a_ring_as_it_is():
     """Mean energy and variances of a ring at the default step, at half of it, by Metropolis."""
-    from dnacheck.jfactor.metropolis import ClosedRingOptions, closed_ring_ensemble
-    from dnacheck.ring.search import find_rings
+    from dnacheck.cyclization.ensembles.metropolis import ClosedRingOptions, closed_ring_ensemble
+    from dnacheck.equilibria.discrete.search import find_rings
 
     chain = ring_chain(24)
     ring = find_rings(chain).lowest

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from bead_chains import coupled_stiffness, ring_chain
 
+from dnacheck.equilibria.discrete.search import find_rings
 from dnacheck.md.bead_chain import BeadChain, BeadEnergy
 from dnacheck.md.ensemble import EnsembleOptions, sample_ensemble
 from dnacheck.md.ensemble_statistics import estimate
@@ -14,7 +15,6 @@ from dnacheck.md.geometry import per_base_pair_fluctuation
 from dnacheck.md.harmonic import harmonic_fluctuation
 from dnacheck.md.minimise import minimise
 from dnacheck.numerics.outcome import InputError
-from dnacheck.ring.search import find_rings
 
 CIRCLE = np.stack(
     [np.cos(np.arange(24) * np.pi / 12), np.sin(np.arange(24) * np.pi / 12), np.zeros(24)], axis=1
@@ -83,7 +83,7 @@ def softened(chain, factor):
 @pytest.mark.parametrize("form", ["wedge", "midstep"])
 def test_dynamics_and_metropolis_fluctuate_alike_where_one_half_is_soft(form):
     """A strong profile under a full stiffness; the uniform chain's profile must not pass."""
-    from dnacheck.jfactor.metropolis import ClosedRingOptions, closed_ring_ensemble
+    from dnacheck.cyclization.ensembles.metropolis import ClosedRingOptions, closed_ring_ensemble
 
     chain = replace(softened(ring_chain(60), 0.15), step_form=form)
     ring = find_rings(chain).lowest

@@ -5,6 +5,7 @@ import pytest
 from bead_chains import ring_chain
 from rods import ELEVEN, molecule_chain
 
+from dnacheck.equilibria.discrete.search import find_rings
 from dnacheck.md.bead_chain import BeadChain, BeadEnergy
 from dnacheck.md.geometry import planar_ring
 from dnacheck.md.harmonic import harmonic_fluctuation, hessian
@@ -17,7 +18,6 @@ from dnacheck.md.minimise import (
 )
 from dnacheck.numerics.outcome import InputError, SolveError, Status
 from dnacheck.numerics.superpose import superpose
-from dnacheck.ring.search import find_rings
 
 
 @pytest.mark.parametrize("n", [6, 7, 10, 11, 23, 42, 158])

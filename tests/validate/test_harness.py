@@ -14,19 +14,24 @@ from dnacheck.cli import main
 from dnacheck.model.data_files import data_directory
 from dnacheck.numerics.outcome import InputError
 from dnacheck.validate import harness, worker
-from dnacheck.validate.baseline import compare, read_baseline
-from dnacheck.validate.context import Context, seed_of
-from dnacheck.validate.plan import Plan, Step, make_plan
-from dnacheck.validate.registry import Check, Findings, Level, all_checks, find_check, select
+from dnacheck.validate.engine.baseline import compare, read_baseline
+from dnacheck.validate.engine.context import Context, seed_of
+from dnacheck.validate.engine.plan import Plan, Step, make_plan
+from dnacheck.validate.engine.registry import Check, Findings, Level, all_checks, find_check, select
+from dnacheck.validate.engine.runner import run_checks
+from dnacheck.validate.engine.state import (
+    StateFolder,
+    findings_from_json,
+    findings_to_json,
+    run_key,
+)
+from dnacheck.validate.engine.verdict import Rule, Verdict, judge, must_fail
 from dnacheck.validate.report import RunRecord
 from dnacheck.validate.report.html import report_html
+from dnacheck.validate.report.record import Column, Figure, Note, Rings, Table
 from dnacheck.validate.report.tables import table_csv
 from dnacheck.validate.report.write import report_json
-from dnacheck.validate.runner import run_checks
-from dnacheck.validate.scene_file import load_scene
-from dnacheck.validate.sections import Column, Figure, Note, Rings, Table
-from dnacheck.validate.state import StateFolder, findings_from_json, findings_to_json, run_key
-from dnacheck.validate.verdict import Rule, Verdict, judge, must_fail
+from dnacheck.validate.scene.file import load_scene
 
 NASTY = "<script>alert('x')</script>"
 
@@ -47,7 +52,7 @@ def findings(results=None):
 
 def record_of(scene, found, provenance_seconds=1.0):
     check = Check("table2.discrete", "a check", lambda context: found, 1.0)
-    from dnacheck.validate.provenance import provenance
+    from dnacheck.validate.engine.provenance import provenance
 
     return RunRecord(
         scene=scene,
@@ -173,8 +178,8 @@ def test_the_drawing_library_travels_compressed(scene):
 
 
 def test_the_check_nearest_to_its_limit_is_shown(scene):
-    from dnacheck.validate.report.glance import glance, share_used
-    from dnacheck.validate.sections import Section
+    from dnacheck.validate.report.record import Section
+    from dnacheck.validate.report.summary import glance, share_used
 
     def judged(name, got, rule, tolerance=None, **more):
         return judge(f"table2.{name}", "q", got, 2.0, rule, "s", "w", tolerance, **more)
@@ -235,7 +240,7 @@ def test_only_selects_by_name_group_and_pattern():
 
 def test_missing_modules_are_skipped_with_the_reason(scene, monkeypatch):
     check = replace(find_check("table2.discrete"), requires=("dnacheck.nowhere.at_all",))
-    monkeypatch.setattr("dnacheck.validate.plan.all_checks", lambda: (check,))
+    monkeypatch.setattr("dnacheck.validate.engine.plan.all_checks", lambda: (check,))
     plan = make_plan(scene, Level.QUICK)
     assert [step.check.name for step in plan.skipped] == ["table2.discrete"]
     assert "not installed" in plan.skipped[0].reason

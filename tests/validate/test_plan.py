@@ -6,16 +6,16 @@ import sys
 
 import pytest
 
-from dnacheck.validate.checks.wanted.ln_j import ln_J
-from dnacheck.validate.checks.wanted.shapes import shape
-from dnacheck.validate.checks.wanted.thermal import equipartition, sampled, thermal_energy
-from dnacheck.validate.context import Context
-from dnacheck.validate.pilots import Candidate, choose
-from dnacheck.validate.plan import make_plan
-from dnacheck.validate.registry import Level
-from dnacheck.validate.scene import Wanted
-from dnacheck.validate.scene_file import read_scene
-from dnacheck.validate.verdict import Verdict
+from dnacheck.validate.checks.requested.ln_j import ln_J
+from dnacheck.validate.checks.requested.shapes import shape
+from dnacheck.validate.checks.requested.thermal import equipartition, sampled, thermal_energy
+from dnacheck.validate.engine.context import Context
+from dnacheck.validate.engine.pilots import Candidate, choose
+from dnacheck.validate.engine.plan import make_plan
+from dnacheck.validate.engine.registry import Level
+from dnacheck.validate.engine.verdict import Verdict
+from dnacheck.validate.scene.file import read_scene
+from dnacheck.validate.scene.scene import Wanted
 
 SCENE = """title = "t"
 
@@ -54,10 +54,10 @@ def test_energies_alone_load_neither_sampling_nor_dynamics(tmp_path):
     scene_of(tmp_path, "energy = 0.005")
     program = f"""
 import json, sys
-from dnacheck.validate.context import Context
-from dnacheck.validate.plan import make_plan
-from dnacheck.validate.registry import Level
-from dnacheck.validate.scene_file import load_scene
+from dnacheck.validate.engine.context import Context
+from dnacheck.validate.engine.plan import make_plan
+from dnacheck.validate.engine.registry import Level
+from dnacheck.validate.scene.file import load_scene
 scene = load_scene({str(tmp_path / "scene.toml")!r})
 checks = make_plan(scene, Level.DEFAULT).chosen
 for check in checks:
@@ -72,8 +72,8 @@ print(json.dumps([[check.name for check in checks], sorted(sys.modules)]))
     assert names == ["wanted.energy", "discrete.derivatives"]
     assert not [name for name in modules if name.startswith(("openmm", "pymbar", "dnacheck.md"))]
     # the package's own first lines may be loaded to list its checks, a sampler may not
-    sampling = ("closure_sampling", "half_chain", "umbrella", "metropolis", "draw_kernels")
-    assert not [name for name in modules if name.removeprefix("dnacheck.jfactor.") in sampling]
+    sampling = ("closure", "half_chain", "umbrella", "ensembles")
+    assert not [name for name in modules if name.removeprefix("dnacheck.cyclization.") in sampling]
 
 
 def test_ln_j_stops_at_the_cheapest_method_that_gives_it(tmp_path):
@@ -121,7 +121,7 @@ def test_mean_energy_of_a_stiff_chain_is_equipartition(tmp_path):
     """Ten times the stiffness leaves a tenth of what is not harmonic."""
     from dataclasses import replace
 
-    from dnacheck.validate.rings import scene_chain
+    from dnacheck.validate.engine.rings import scene_chain
 
     scene = scene_of(tmp_path, "thermal_energy = 0.01")
     chain = scene_chain(scene, scene.molecule_list[0])

@@ -89,7 +89,7 @@ def break_table(folder):
 # What is broken: file, line, the same wrong; the scene and groups that run; the check that notices.
 SABOTAGE = {
     "a sign": (
-        "dnacheck/ring/closure_kernels.py",
+        "dnacheck/equilibria/discrete/kernels/closure.py",
         "out[1, k] = a2 * x - a0 * z",
         "out[1, k] = a2 * x + a0 * z",
         ("quick", "discrete.derivatives"),
@@ -111,14 +111,14 @@ SABOTAGE = {
         "table2.continuum",
     ),
     "an acceptance rule": (
-        "dnacheck/jfactor/metropolis_kernels.py",
+        "dnacheck/cyclization/ensembles/kernels/open_moves.py",
         "if uniform(state) < ratio * math.exp(-change):",
         "if uniform(state) < ratio * math.exp(-0.9 * change):",
         ("default", "jfactor.acceptance"),
         "jfactor.acceptance",
     ),
     "a closure tolerance": (
-        "dnacheck/ring/discrete.py",
+        "dnacheck/equilibria/discrete/solve.py",
         "tolerance: float = 1e-10",
         "tolerance: float = 1e-3",
         ("quick", "wanted"),

@@ -6,9 +6,9 @@ from dnacheck.model.chain import build_chain
 from dnacheck.model.molecules import embedded
 from dnacheck.model.rod import build_rod
 from dnacheck.validate.checks import speed
-from dnacheck.validate.plan import make_plan
-from dnacheck.validate.registry import Level
-from dnacheck.validate.scene_file import load_scene
+from dnacheck.validate.engine.plan import make_plan
+from dnacheck.validate.engine.registry import Level
+from dnacheck.validate.scene.file import load_scene
 
 
 @pytest.fixture(scope="module")

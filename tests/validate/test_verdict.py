@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from dnacheck.validate.verdict import (
+from dnacheck.validate.engine.verdict import (
     Rule,
     Verdict,
     failed,

@@ -15,22 +15,22 @@ import time
 
 import numpy as np
 
-from dnacheck.jfactor.anharmonic import AnharmonicOptions, corrected_laplace
-from dnacheck.jfactor.closure_sampling import ClosureOptions, ClosureSampler
-from dnacheck.jfactor.compare import (
+from dnacheck.cyclization.closure.sampling import ClosureOptions, ClosureSampler
+from dnacheck.cyclization.half_chain.sampling import HalfChainOptions, half_chain
+from dnacheck.cyclization.laplace.anharmonic import AnharmonicOptions, corrected_laplace
+from dnacheck.cyclization.laplace.register import register_profile
+from dnacheck.cyclization.umbrella.sampling import UmbrellaOptions
+from dnacheck.equilibria.discrete.search import find_rings
+from dnacheck.model.chain import Chain, build_chain, uniform_stiffness
+from dnacheck.model.molecules import embedded, embedded_names
+from dnacheck.validate.reference.agreement import (
     APPROXIMATE,
     CompareOptions,
     compare_methods,
     differences,
     standard_error,
 )
-from dnacheck.jfactor.half_chain import HalfChainOptions, half_chain
-from dnacheck.jfactor.register import register_profile
-from dnacheck.jfactor.rod_limits import chain_rod_j
-from dnacheck.jfactor.umbrella import UmbrellaOptions
-from dnacheck.model.chain import Chain, build_chain, uniform_stiffness
-from dnacheck.model.molecules import embedded, embedded_names
-from dnacheck.ring.search import find_rings
+from dnacheck.validate.reference.wormlike_chain import chain_rod_j
 
 SEED = 1
 BEST = ("09T15", "08T15", "08A17")

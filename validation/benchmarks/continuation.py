@@ -18,21 +18,26 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from oracles import auto07p
 
+from dnacheck.equilibria.bridge.reconstruct import reconstruct
+from dnacheck.equilibria.continuation import (
+    ContinuationOptions,
+    Kind,
+    lowest_component,
+    perfect_diagram,
+)
+from dnacheck.equilibria.continuation.branch import ring_from
+from dnacheck.equilibria.continuation.diagram import start_walker
+from dnacheck.equilibria.continuation.figures import marked_rings
+from dnacheck.equilibria.continuation.follow import Bounds, follow_branch
+from dnacheck.equilibria.continuation.parameters import end_twist, perfect_rod
+from dnacheck.equilibria.continuum import ContinuumOptions
+from dnacheck.equilibria.continuum.collocation import discretise
+from dnacheck.equilibria.continuum.search import lowest_continuum_ring
+from dnacheck.equilibria.continuum.state import new_state, run_newton, transfer
+from dnacheck.equilibria.discrete.solve import NewtonOptions, solve_ring
 from dnacheck.model.chain import build_chain
 from dnacheck.model.molecules import embedded
 from dnacheck.model.rod import build_rod
-from dnacheck.ring.continuation import ContinuationOptions, Kind, lowest_component, perfect_diagram
-from dnacheck.ring.continuation.branch import ring_from
-from dnacheck.ring.continuation.diagram import start_walker
-from dnacheck.ring.continuation.figures import marked_rings
-from dnacheck.ring.continuation.follow import Bounds, follow_branch
-from dnacheck.ring.continuation.parameters import end_twist, perfect_rod
-from dnacheck.ring.continuum import ContinuumOptions
-from dnacheck.ring.continuum.collocation import discretise
-from dnacheck.ring.continuum.search import lowest_continuum_ring
-from dnacheck.ring.continuum.state import new_state, run_newton, transfer
-from dnacheck.ring.discrete import NewtonOptions, solve_ring
-from dnacheck.ring.reconstruct import reconstruct
 
 
 def figure_six() -> None:

@@ -21,25 +21,25 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from oracles import scipy_bvp
 
-from dnacheck.model.chain import Chain, build_chain
-from dnacheck.model.data_files import data_directory
-from dnacheck.model.molecules import embedded, embedded_names
-from dnacheck.model.rod import Rod, RodOptions, build_rod
-from dnacheck.model.sequence import Sequence
-from dnacheck.ring.continuum import (
+from dnacheck.equilibria.bridge.reconstruct import reconstruct, rms_difference
+from dnacheck.equilibria.continuum import (
     ContinuumOptions,
     lowest_continuum_ring,
     solve_continuum_ring,
 )
-from dnacheck.ring.continuum.collocation import aligned_mesh, discretise
-from dnacheck.ring.continuum.state import (
+from dnacheck.equilibria.continuum.collocation import aligned_mesh, discretise
+from dnacheck.equilibria.continuum.state import (
     new_state,
     register_roll,
     run_newton,
     start_from_perfect_ring,
 )
-from dnacheck.ring.reconstruct import reconstruct, rms_difference
-from dnacheck.ring.search import find_rings
+from dnacheck.equilibria.discrete.search import find_rings
+from dnacheck.model.chain import Chain, build_chain
+from dnacheck.model.data_files import data_directory
+from dnacheck.model.molecules import embedded, embedded_names
+from dnacheck.model.rod import Rod, RodOptions, build_rod
+from dnacheck.model.sequence import Sequence
 
 
 def milliseconds(call: Callable[[], object], repeats: int = 40) -> tuple[float, float]:

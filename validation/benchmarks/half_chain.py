@@ -14,13 +14,13 @@ import time
 
 import numpy as np
 
-from dnacheck.jfactor.half_chain import HalfChainOptions, half_chain_estimate
-from dnacheck.jfactor.half_chain_window import HalfChainEstimate
-from dnacheck.jfactor.laplace import laplace
-from dnacheck.jfactor.rod_limits import chain_rod_j
+from dnacheck.cyclization.half_chain.sampling import HalfChainOptions, half_chain_estimate
+from dnacheck.cyclization.half_chain.window import HalfChainEstimate
+from dnacheck.cyclization.laplace.isolated import laplace
+from dnacheck.equilibria.discrete.search import RingSearch, find_rings
 from dnacheck.model.chain import Chain, build_chain, uniform_stiffness
 from dnacheck.model.molecules import embedded, embedded_names
-from dnacheck.ring.search import RingSearch, find_rings
+from dnacheck.validate.reference.wormlike_chain import chain_rod_j
 
 SEED = 1
 BEST = ("09T15", "08T15", "08A17")

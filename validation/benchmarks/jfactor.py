@@ -16,16 +16,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dnacheck.jfactor.closure_sampling import ClosureOptions, ClosureSampler
-from dnacheck.jfactor.laplace import laplace
-from dnacheck.jfactor.register import RegisterProfile, register_profile
-from dnacheck.jfactor.result import JFactor
-from dnacheck.jfactor.speed import LONG, molecules, study, warm_up
+from dnacheck.cyclization.closure.sampling import ClosureOptions, ClosureSampler
+from dnacheck.cyclization.laplace.isolated import laplace
+from dnacheck.cyclization.laplace.register import RegisterProfile, register_profile
+from dnacheck.cyclization.result import JFactor
+from dnacheck.equilibria.discrete.search import find_rings
 from dnacheck.model.chain import Chain, build_chain, uniform_stiffness
 from dnacheck.model.molecules import embedded, embedded_names
 from dnacheck.model.sequence import parse_sequence
 from dnacheck.numerics.outcome import SolveError
-from dnacheck.ring.search import find_rings
+from dnacheck.validate.reference.work_precision import LONG, molecules, study, warm_up
 
 SEED = 1
 RANDOM_MOLECULES = 200

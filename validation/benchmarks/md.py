@@ -16,11 +16,13 @@ from pathlib import Path
 
 import numpy as np
 
-from dnacheck.jfactor.metropolis import (
+from dnacheck.cyclization.ensembles.metropolis import (
     ClosedRingEnsemble,
     ClosedRingOptions,
     closed_ring_ensemble,
 )
+from dnacheck.equilibria.discrete.search import find_rings
+from dnacheck.equilibria.discrete.solve import DiscreteRing
 from dnacheck.md.bead_chain import BeadChain, BeadEnergy, sabotaged
 from dnacheck.md.check import MdOptions, run_md_check
 from dnacheck.md.ensemble import Ensemble, EnsembleOptions, sample_ensemble
@@ -31,8 +33,6 @@ from dnacheck.md.minimise import MinimiseOptions, minimise
 from dnacheck.model.chain import Chain, build_chain
 from dnacheck.model.molecules import embedded
 from dnacheck.numerics.outcome import SolveError
-from dnacheck.ring.discrete import DiscreteRing
-from dnacheck.ring.search import find_rings
 
 
 def stable_rings(chain: Chain) -> list[DiscreteRing]:

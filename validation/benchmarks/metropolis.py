@@ -14,13 +14,13 @@ import time
 
 import numpy as np
 
-from dnacheck.jfactor.closure_sampling import ClosureOptions, sample_closure
-from dnacheck.jfactor.half_chain import HalfChainOptions, half_chain
-from dnacheck.jfactor.metropolis import ClosedRingOptions, closed_ring_ensemble
-from dnacheck.jfactor.umbrella import UmbrellaOptions, umbrella_estimate
+from dnacheck.cyclization.closure.sampling import ClosureOptions, sample_closure
+from dnacheck.cyclization.ensembles.metropolis import ClosedRingOptions, closed_ring_ensemble
+from dnacheck.cyclization.half_chain.sampling import HalfChainOptions, half_chain
+from dnacheck.cyclization.umbrella.sampling import UmbrellaOptions, umbrella_estimate
+from dnacheck.equilibria.discrete.search import find_rings
 from dnacheck.model.chain import build_chain
 from dnacheck.model.molecules import embedded
-from dnacheck.ring.search import find_rings
 
 SEED = 1
 CALIBRATION_RUNS = 16

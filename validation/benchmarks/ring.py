@@ -17,13 +17,13 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from dnacheck.equilibria.discrete.kernels.starts import fill_circle
+from dnacheck.equilibria.discrete.search import find_rings
+from dnacheck.equilibria.discrete.solve import solve_ring
 from dnacheck.model.chain import build_chain
 from dnacheck.model.molecules import embedded, embedded_names
 from dnacheck.model.rod import build_rod
 from dnacheck.model.sequence import Sequence
-from dnacheck.ring.discrete import solve_ring
-from dnacheck.ring.search import find_rings
-from dnacheck.ring.start_kernels import fill_circle
 
 
 def timed(work: Callable[[], object], repeats: int) -> tuple[float, float]:

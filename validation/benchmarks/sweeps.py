@@ -6,11 +6,11 @@ import time
 
 import numpy as np
 
+from dnacheck.equilibria.continuation.figures import RATIOS, robustness
+from dnacheck.equilibria.continuation.twist_ratio import sweep_continuum, sweep_discrete
 from dnacheck.model.chain import build_chain
 from dnacheck.model.molecules import embedded, embedded_names
 from dnacheck.model.rod import build_rod
-from dnacheck.ring.continuation.figures import RATIOS, robustness
-from dnacheck.ring.sweep import sweep_continuum, sweep_discrete
 
 ANGLE_SETS = ("trifonov2", "trifonov", "desantis")
 

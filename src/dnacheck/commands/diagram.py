@@ -19,7 +19,7 @@ from dnacheck.commands.common import (
 from dnacheck.commands.output import note, print_json
 
 if TYPE_CHECKING:
-    from dnacheck.ring.continuation.component import Component
+    from dnacheck.equilibria.continuation.component import Component
 
 EXIT_NOT_CONVERGED = 3
 
@@ -80,8 +80,8 @@ def command(
     TARGET may be "perfect", the straight uniform rod of Figure 6. Rings whose sugar-phosphate
     chains close are marked; stable stretches are those without conjugate points.
     """
-    from dnacheck.ring.continuation.branch import BranchError
-    from dnacheck.ring.continuation.figures import component_data
+    from dnacheck.equilibria.continuation.branch import BranchError
+    from dnacheck.equilibria.continuation.figures import component_data
 
     try:
         found = _components(target, bounds, start, search, max_points, n_bp, model, continuum)
@@ -117,14 +117,14 @@ def _components(
     import math
     from dataclasses import replace
 
+    from dnacheck.equilibria.continuation import diagram
+    from dnacheck.equilibria.continuation.follow import Bounds
+    from dnacheck.equilibria.continuation.options import ContinuationOptions
+    from dnacheck.equilibria.continuation.parameters import perfect_rod
     from dnacheck.model.chain import TWIST_RATIO, build_chain
     from dnacheck.model.molecules import read_target
     from dnacheck.model.rod import RodOptions, build_rod
     from dnacheck.numerics.outcome import InputError
-    from dnacheck.ring.continuation import diagram
-    from dnacheck.ring.continuation.follow import Bounds
-    from dnacheck.ring.continuation.options import ContinuationOptions
-    from dnacheck.ring.continuation.parameters import perfect_rod
 
     turn = 2.0 * math.pi
     limits = None if bounds is None else Bounds(turn * bounds[0], turn * bounds[1])
@@ -187,7 +187,7 @@ def _draw(
     path: Path, target: str, found: tuple[Component, ...], data: list[dict[str, Any]]
 ) -> None:
     from dnacheck.commands.pictures import save_figure
-    from dnacheck.ring.continuation.figures import marked_rings, ring_shape
+    from dnacheck.equilibria.continuation.figures import marked_rings, ring_shape
     from dnacheck.validate.plots import continuation as plots
 
     branches = [branch for record in data for branch in record["branches"]]

@@ -22,8 +22,8 @@ from dnacheck.commands.output import note, print_json, progress
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dnacheck.jfactor.result import JFactor
-    from dnacheck.ring.search import RingSearch
+    from dnacheck.cyclization.result import JFactor
+    from dnacheck.equilibria.discrete.search import RingSearch
 
 EXIT_NOT_CONVERGED = 3
 METHODS = (
@@ -77,10 +77,10 @@ def command(
 
     -ln J is the free energy of cyclization over RT.
     """
+    from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
     from dnacheck.model.chain import build_chain
     from dnacheck.model.molecules import read_target
     from dnacheck.numerics.outcome import InputError, SolveError
-    from dnacheck.ring.search import SearchOptions, find_rings
 
     records: list[dict[str, Any]] = []
     good = True
@@ -148,33 +148,33 @@ def _computed(
         made = total
 
     if method == "auto":
-        from dnacheck.jfactor.choose import choose
+        from dnacheck.cyclization.automatic import choose
 
         choice = choose(search, tolerance, limit, run.seed, run.threads, drawn)
         return choice.result, choice.reason
     if method == "laplace":
-        from dnacheck.jfactor.laplace import laplace
+        from dnacheck.cyclization.laplace.isolated import laplace
 
         return laplace(search), ""
     if method == "register-laplace":
-        from dnacheck.jfactor.register import register_laplace
+        from dnacheck.cyclization.laplace.register import register_laplace
 
         return register_laplace(search), ""
     if method == "corrected-laplace":
-        from dnacheck.jfactor.anharmonic import AnharmonicOptions, corrected_laplace
+        from dnacheck.cyclization.laplace.anharmonic import AnharmonicOptions, corrected_laplace
 
         return corrected_laplace(search, AnharmonicOptions(tolerance=tolerance), run.seed), ""
     if method == "closure":
-        from dnacheck.jfactor.closure_sampling import ClosureOptions, ClosureSampler
-        from dnacheck.jfactor.register import register_profile
+        from dnacheck.cyclization.closure.sampling import ClosureOptions, ClosureSampler
+        from dnacheck.cyclization.laplace.register import register_profile
 
         options = ClosureOptions(tolerance=tolerance, max_seconds=limit, threads=run.threads)
         return ClosureSampler(register_profile(search), options, run.seed).sample(drawn), ""
     if method == "half-chain":
-        from dnacheck.jfactor.choose import half_chains_to_tolerance
+        from dnacheck.cyclization.automatic import half_chains_to_tolerance
 
         return half_chains_to_tolerance(search, tolerance, limit, run.seed, run.threads), ""
-    from dnacheck.jfactor.choose import metropolis_to_tolerance
+    from dnacheck.cyclization.automatic import metropolis_to_tolerance
 
     return metropolis_to_tolerance(search, tolerance, limit, run.seed, run.threads), ""
 

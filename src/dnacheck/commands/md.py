@@ -186,8 +186,8 @@ def _check(
     import numpy as np
 
     from dnacheck.commands.md_output import print_check, record_of, write_files
+    from dnacheck.equilibria.discrete.search import find_rings
     from dnacheck.md.check import run_md_check
-    from dnacheck.ring.search import find_rings
 
     begin = time.perf_counter()
     search = find_rings(chain)

@@ -21,10 +21,10 @@ from dnacheck.commands.common import (
 from dnacheck.commands.output import note, print_json, progress
 
 if TYPE_CHECKING:
+    from dnacheck.equilibria.continuum import ContinuumRing
+    from dnacheck.equilibria.discrete.solve import DiscreteRing
     from dnacheck.model.chain import Chain
     from dnacheck.model.molecules import Molecule
-    from dnacheck.ring.continuum import ContinuumRing
-    from dnacheck.ring.discrete import DiscreteRing
 
 EXIT_BAD_INPUT = 2
 EXIT_NOT_CONVERGED = 3
@@ -118,7 +118,7 @@ def _solve(
         converged = converged and discrete is not None
     comparison = None
     if smooth is not None and discrete is not None:
-        from dnacheck.ring.reconstruct import reconstruct, rms_difference
+        from dnacheck.equilibria.bridge.reconstruct import reconstruct, rms_difference
 
         comparison = {
             "energy_difference_percent": 100.0 * (smooth.energy / discrete.energy - 1.0),
@@ -144,7 +144,7 @@ def _solve(
 def _discrete(
     chain: Chain, ring: RingSettings, warnings: list[str]
 ) -> tuple[DiscreteRing | None, list[dict[str, Any]]]:
-    from dnacheck.ring.search import SearchOptions, find_rings
+    from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
 
     found = find_rings(chain, SearchOptions(links=ring.link))
     if found.failed_starts:
@@ -192,8 +192,8 @@ def _discrete(
 def _continuum(
     chain: Chain, ring: RingSettings, continuum: ContinuumSettings, warnings: list[str]
 ) -> tuple[ContinuumRing | None, list[dict[str, Any]]]:
+    from dnacheck.equilibria.continuum import lowest_continuum_ring
     from dnacheck.model.rod import RodOptions, build_rod
-    from dnacheck.ring.continuum import lowest_continuum_ring
 
     rod = build_rod(
         chain,
@@ -234,13 +234,13 @@ def _continuum(
 def _write(
     path: Path, chain: Chain, smooth: ContinuumRing | None, discrete: DiscreteRing | None
 ) -> None:
-    from dnacheck.md.structure_file import write_ring_structure
+    from dnacheck.io.structure import write_ring_structure
     from dnacheck.numerics.outcome import SolveError
 
     if discrete is not None:
         centres, frames = discrete.centres, discrete.frames
     elif smooth is not None:
-        from dnacheck.ring.reconstruct import reconstruct
+        from dnacheck.equilibria.bridge.reconstruct import reconstruct
 
         rebuilt = reconstruct(smooth)
         centres, frames = rebuilt.centres, rebuilt.frames

@@ -35,7 +35,7 @@ def command(
     A killed scan goes on where it stopped when the same command is given again, and ends with the
     same file. A bad record is a row with its reason in the column "status".
     """
-    from dnacheck.jfactor.scan import ScanOptions, fingerprint, scan, state_path, summary_line
+    from dnacheck.scan.scan import ScanOptions, fingerprint, scan, state_path, summary_line
 
     _, records = fingerprint(fasta)
     options = ScanOptions(model.chain_arguments(), run.threads)

@@ -100,12 +100,12 @@ def command(
     Every minimum found is followed, and the search is repeated at some of the ratios, so that the
     energies are those of the lowest ring at each; the twist ratio of the model is not used.
     """
+    from dnacheck.equilibria.continuation.figures import sweep_data
+    from dnacheck.equilibria.continuation.twist_ratio import sweep_continuum, sweep_discrete
     from dnacheck.model.chain import build_chain
     from dnacheck.model.molecules import read_target
     from dnacheck.model.rod import RodOptions, build_rod
     from dnacheck.numerics.outcome import InputError
-    from dnacheck.ring.continuation.figures import sweep_data
-    from dnacheck.ring.sweep import sweep_continuum, sweep_discrete
 
     molecules = list(read_target(target))
     models = ("continuum", "discrete") if which == "both" else (which,)

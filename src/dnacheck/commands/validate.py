@@ -11,8 +11,8 @@ from dnacheck.commands.common import RunSettings, common_options
 from dnacheck.commands.output import note, print_json, progress
 
 if TYPE_CHECKING:
-    from dnacheck.validate.plan import Plan
-    from dnacheck.validate.registry import Check, Findings
+    from dnacheck.validate.engine.plan import Plan
+    from dnacheck.validate.engine.registry import Check, Findings
     from dnacheck.validate.report import RunRecord
 
 EXIT_CHECK_FAILED = 1
@@ -62,10 +62,10 @@ def command(
     if new_scene is not None:
         _write_scene(new_scene, run)
         return None
-    from dnacheck.validate.harness import RunOptions, run_scene
-    from dnacheck.validate.plan import make_plan
-    from dnacheck.validate.registry import Level, select
-    from dnacheck.validate.scene_file import load_scene
+    from dnacheck.validate.engine.plan import make_plan
+    from dnacheck.validate.engine.registry import Level, select
+    from dnacheck.validate.engine.run import RunOptions, run_scene
+    from dnacheck.validate.scene.file import load_scene
 
     level = Level.QUICK if quick else Level.FULL if full else Level.DEFAULT
     chosen = select(only) if only else None
@@ -86,9 +86,9 @@ def command(
 
 def _write_scene(path: Path, run: RunSettings) -> None:
     """Write the commented template; an existing file is not overwritten."""
-    from dnacheck.model.files import atomic_write
+    from dnacheck.io.files import atomic_write
     from dnacheck.numerics.outcome import InputError
-    from dnacheck.validate.scene import scenes_directory
+    from dnacheck.validate.scene.scene import scenes_directory
 
     if path.exists():
         raise InputError(f"file '{path}' exists; name another file for the new scene")

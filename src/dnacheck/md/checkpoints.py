@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dnacheck.model.files import atomic_write
+from dnacheck.io.files import atomic_write
 from dnacheck.numerics.outcome import InputError
 
 Array = NDArray[np.float64]

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rods import ANGLE_SETS, ELEVEN, molecule_chain, molecule_rod, random_chain, straight_chain
 
+from dnacheck.equilibria.continuum import solve_continuum_ring
 from dnacheck.model.rod import RodOptions, build_rod
 from dnacheck.numerics.outcome import InputError
-from dnacheck.ring.continuum import solve_continuum_ring
 
 
 @pytest.mark.parametrize("name", ELEVEN)

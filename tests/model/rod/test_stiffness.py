@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from rods import molecule_chain
 
+from dnacheck.equilibria.continuum import solve_continuum_ring
+from dnacheck.equilibria.discrete.search import find_rings
 from dnacheck.model.chain import Chain
 from dnacheck.model.rod import RodOptions, build_rod
 from dnacheck.numerics.outcome import InputError
-from dnacheck.ring.continuum import solve_continuum_ring
-from dnacheck.ring.search import find_rings
 
 
 def _with_stiffness(chain, stiffness):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dnacheck.validate.verdict import CheckResult, Rule, Value, judge
+from dnacheck.validate.engine.verdict import CheckResult, Rule, Value, judge
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,14 @@ from collections.abc import Callable
 
 import numpy as np
 
+from dnacheck.equilibria.continuum import lowest_continuum_ring
 from dnacheck.model.chain import Chain, build_chain
 from dnacheck.model.molecules import embedded
 from dnacheck.model.rod import RodOptions, build_rod
 from dnacheck.model.sequence import parse_sequence
 from dnacheck.numerics.outcome import DnaCheckError, InputError
-from dnacheck.ring.continuum import lowest_continuum_ring
 from dnacheck.validate.cases.case import HardCase, hard_case
-from dnacheck.validate.verdict import Rule
+from dnacheck.validate.engine.verdict import Rule
 
 GROUP = "continuum"
 
@@ -36,9 +36,9 @@ def _refusal(
 def zero_twist(rng: np.random.Generator) -> HardCase:
     """End twist exactly 0: the start that the paper calls degenerate."""
     del rng
-    from dnacheck.ring.continuation.branch import BranchError
-    from dnacheck.ring.continuation.diagram import imperfect_component
-    from dnacheck.ring.continuation.parameters import perfect_rod
+    from dnacheck.equilibria.continuation.branch import BranchError
+    from dnacheck.equilibria.continuation.diagram import imperfect_component
+    from dnacheck.equilibria.continuation.parameters import perfect_rod
 
     return _refusal(
         "end twist exactly 0",
@@ -52,9 +52,9 @@ def zero_twist(rng: np.random.Generator) -> HardCase:
 def at_bifurcation(rng: np.random.Generator) -> HardCase:
     """α exactly at a branch point of the perfect diagram."""
     del rng
-    from dnacheck.ring.continuation.branch import BranchError
-    from dnacheck.ring.continuation.diagram import perfect_diagram
-    from dnacheck.ring.continuation.parameters import perfect_rod
+    from dnacheck.equilibria.continuation.branch import BranchError
+    from dnacheck.equilibria.continuation.diagram import perfect_diagram
+    from dnacheck.equilibria.continuation.parameters import perfect_rod
 
     alpha = 2.0 * math.pi * math.sqrt(3.0) / 1.5
     return _refusal(

@@ -17,7 +17,7 @@ from dnacheck.numerics.rotations import (
     wedge_rotation,
 )
 from dnacheck.validate.cases.case import HardCase, hard_case
-from dnacheck.validate.verdict import Rule
+from dnacheck.validate.engine.verdict import Rule
 
 GROUP = "geometry"
 _EPS = float(np.finfo(float).eps)

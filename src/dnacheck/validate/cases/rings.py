@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from dnacheck.equilibria.discrete.search import RingSearch, SearchOptions, find_rings, search_minima
+from dnacheck.equilibria.discrete.solve import NewtonOptions
 from dnacheck.model.chain import Chain, build_chain, uniform_stiffness
 from dnacheck.model.molecules import embedded
 from dnacheck.model.sequence import Sequence, parse_sequence
-from dnacheck.ring.discrete import NewtonOptions
-from dnacheck.ring.search import RingSearch, SearchOptions, find_rings, search_minima
 from dnacheck.validate.cases.case import HardCase, hard_case
 from dnacheck.validate.cases.geometry import long_double_end
-from dnacheck.validate.verdict import Rule
+from dnacheck.validate.engine.verdict import Rule
 
 GROUP = "rings"
 _TIGHT = 1e-9
@@ -287,7 +287,7 @@ def condition_numbers(rng: np.random.Generator) -> list[dict[str, Any]]:
         its smallest eigenvalue; closure: condition of G K^-1 G^T with lengths in units of the
         ring's radius.
     """
-    from dnacheck.ring.closure_kernels import closure_jacobian, linearise
+    from dnacheck.equilibria.discrete.kernels.closure import closure_jacobian, linearise
 
     rows = []
     for n in (50, 150, 500, 2000):

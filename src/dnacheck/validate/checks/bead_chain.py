@@ -5,16 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from dnacheck.validate.checks.bead_ensemble import LONGEST, ensemble, profile
-from dnacheck.validate.context import Context
-from dnacheck.validate.registry import Check, Findings, Group, Level
-from dnacheck.validate.scene import Scene
-from dnacheck.validate.sections import Column, Figure, Table
-from dnacheck.validate.verdict import CheckResult, Rule, judge, must_fail
+from dnacheck.validate.engine.context import Context
+from dnacheck.validate.engine.registry import Check, Findings, Group, Level
+from dnacheck.validate.engine.verdict import CheckResult, Rule, judge, must_fail
+from dnacheck.validate.report.record import Column, Figure, Table
+from dnacheck.validate.scene.scene import Scene
 
 if TYPE_CHECKING:
+    from dnacheck.equilibria.discrete.solve import DiscreteRing
     from dnacheck.md.check import MdCheck
     from dnacheck.model.chain import Chain
-    from dnacheck.ring.discrete import DiscreteRing
 
 ENERGY_TOLERANCE = 1e-10
 MINIMUM_TOLERANCE = 1e-5
@@ -22,7 +22,7 @@ RMS_TOLERANCE_A = 0.02
 
 
 def _chains(context: Context) -> list[Chain]:
-    from dnacheck.validate.rings import scene_chain
+    from dnacheck.validate.engine.rings import scene_chain
 
     return [scene_chain(context.scene, molecule) for molecule in context.molecules]
 
@@ -43,7 +43,7 @@ def energy(context: Context) -> Findings:
     """OpenMM's energy of every discrete ring, and of faulty bead chains."""
     from dnacheck.md.bead_chain import sabotaged
     from dnacheck.md.check import MdOptions, run_md_check
-    from dnacheck.validate.rings import lowest_ring
+    from dnacheck.validate.engine.rings import lowest_ring
 
     options = MdOptions(minimise=None, ensemble=None, seed=context.seed % 2**31)
     results, rows = [], []
@@ -90,7 +90,7 @@ def energy(context: Context) -> Findings:
 def minimum(context: Context) -> Findings:
     """The bead chain finds the ring by itself."""
     from dnacheck.md.check import MdOptions, run_md_check
-    from dnacheck.validate.rings import lowest_ring
+    from dnacheck.validate.engine.rings import lowest_ring
 
     options = MdOptions(ensemble=None, seed=context.seed % 2**31)
     chains = _chains(context)

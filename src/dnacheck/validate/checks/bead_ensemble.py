@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dnacheck.validate.context import Context
-from dnacheck.validate.registry import Findings, Level
-from dnacheck.validate.sections import Column, Figure, Table
-from dnacheck.validate.verdict import CheckResult, Rule, judge, must_fail
+from dnacheck.validate.engine.context import Context
+from dnacheck.validate.engine.registry import Findings, Level
+from dnacheck.validate.engine.verdict import CheckResult, Rule, judge, must_fail
+from dnacheck.validate.report.record import Column, Figure, Table
 
 if TYPE_CHECKING:
-    from dnacheck.jfactor.metropolis import ClosedRingEnsemble
+    from dnacheck.cyclization.ensembles.metropolis import ClosedRingEnsemble
+    from dnacheck.equilibria.discrete.solve import DiscreteRing
     from dnacheck.md.ensemble import EnsembleOptions
     from dnacheck.md.ensemble_statistics import EnsembleStatistics
     from dnacheck.md.fluctuation import FluctuationProfile
     from dnacheck.model.chain import Array, Chain
-    from dnacheck.ring.discrete import DiscreteRing
 
 EQUIPARTITION_TOLERANCE = 0.01
 LEAST_CORRELATION = 0.99
@@ -65,14 +65,14 @@ def frames_needed(n_steps: int, accuracy: float) -> int:
 
 def motion(chain: Chain, samples: int, seed: int) -> Motion:
     """Shake a ring by dynamics and by Metropolis moves, and take its Laplace fluctuation."""
-    from dnacheck.jfactor.metropolis import ClosedRingOptions, closed_ring_ensemble
+    from dnacheck.cyclization.ensembles.metropolis import ClosedRingOptions, closed_ring_ensemble
     from dnacheck.md.bead_chain import BeadChain, BeadEnergy
     from dnacheck.md.ensemble import EnsembleOptions, sample_ensemble
     from dnacheck.md.ensemble_statistics import analyse_ensemble
     from dnacheck.md.fluctuation import fluctuation_profile
     from dnacheck.md.harmonic import harmonic_fluctuation
     from dnacheck.md.minimise import minimise
-    from dnacheck.validate.rings import lowest_ring
+    from dnacheck.validate.engine.rings import lowest_ring
 
     ring, n = lowest_ring(chain), chain.n_steps
     began = time.process_time()
@@ -113,7 +113,7 @@ def half_soft(chain: Chain) -> Chain:
 
 def _chosen(context: Context) -> list[Chain]:
     """The shortest molecule; at the full level three, spread over the lengths."""
-    from dnacheck.validate.rings import scene_chain
+    from dnacheck.validate.engine.rings import scene_chain
 
     chains = [scene_chain(context.scene, molecule) for molecule in context.molecules]
     fit = sorted((c for c in chains if c.n_steps <= LONGEST), key=lambda c: (c.n_steps, c.name))

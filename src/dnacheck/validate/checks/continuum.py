@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from dnacheck.validate.context import Context
-from dnacheck.validate.oracles import load_oracle, oracle_exists
-from dnacheck.validate.published import PAPER
-from dnacheck.validate.registry import Check, Findings, Group, Level
-from dnacheck.validate.scene import Scene
-from dnacheck.validate.sections import Column, Figure, Table
-from dnacheck.validate.verdict import CheckResult, Rule, judge, must_fail
+from dnacheck.validate.engine.context import Context
+from dnacheck.validate.engine.registry import Check, Findings, Group, Level
+from dnacheck.validate.engine.verdict import CheckResult, Rule, judge, must_fail
+from dnacheck.validate.reference.oracles import load_oracle, oracle_exists
+from dnacheck.validate.reference.published import PAPER
+from dnacheck.validate.report.record import Column, Figure, Table
+from dnacheck.validate.scene.scene import Scene
 
 EQUATIONS_TOLERANCE = 1e-12
 ORACLE_TOLERANCE = 1e-7
@@ -48,7 +48,7 @@ def equations(context: Context) -> Findings:
 
 def _departure(printed: bool) -> float:
     """Largest |y' - rates(y)| over the largest rate, for alpha = 2.3 and K3/K1 = 1.5."""
-    from dnacheck.ring.continuum.equations import rates
+    from dnacheck.equilibria.continuum.equations import rates
 
     alpha, bend, twist = 2.3, 1.0 / 158.0, 1.5 / 158.0
     s = np.linspace(0.0, 1.0, 101)
@@ -95,12 +95,12 @@ def other_solver(context: Context) -> Findings:
     Both start from one register, and where the register is nearly free one may end in the minimum
     and the other in the saddle; ours is therefore the equilibrium of that link nearest to theirs.
     """
-    from dnacheck.ring.continuum import (
+    from dnacheck.equilibria.continuum import (
         ContinuumOptions,
         lowest_continuum_ring,
         solve_continuum_ring,
     )
-    from dnacheck.validate import rings
+    from dnacheck.validate.engine import rings
 
     solve = load_oracle("scipy_bvp").solve
     options = rings.rod_options(context.scene)
@@ -178,8 +178,8 @@ def _softer(rod: Any) -> Any:
 
 def mesh(context: Context) -> Findings:
     """Energies over the meshes of Section VIII."""
-    from dnacheck.ring.continuum import ContinuumOptions, lowest_continuum_ring
-    from dnacheck.validate import rings
+    from dnacheck.equilibria.continuum import ContinuumOptions, lowest_continuum_ring
+    from dnacheck.validate.engine import rings
 
     options = rings.rod_options(context.scene)
     results, rows = [], []
@@ -226,7 +226,7 @@ def mesh(context: Context) -> Findings:
 
 def rods(context: Context) -> Findings:
     """How good the rods are."""
-    from dnacheck.validate import rings
+    from dnacheck.validate.engine import rings
 
     options = rings.rod_options(context.scene)
     rows, results = [], []
@@ -278,7 +278,7 @@ def _figures(context: Context) -> list[Figure]:
     """Figures 4 and 5: the centreline, and what the filter does to it."""
     from dnacheck.model.chain import chain_frames
     from dnacheck.model.rod.filtering import double_filter, padded_steps, smooth
-    from dnacheck.validate import rings
+    from dnacheck.validate.engine import rings
 
     def centreline(name: str) -> Any:
         known = {item.name: item for item in context.molecules}

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dnacheck.validate.context import Context
-from dnacheck.validate.published import PAPER
-from dnacheck.validate.registry import Check, Findings, Group, Level
-from dnacheck.validate.sections import Column, Table
-from dnacheck.validate.verdict import CheckResult, Rule, judge, must_fail
+from dnacheck.validate.engine.context import Context
+from dnacheck.validate.engine.registry import Check, Findings, Group, Level
+from dnacheck.validate.engine.verdict import CheckResult, Rule, judge, must_fail
+from dnacheck.validate.reference.published import PAPER
+from dnacheck.validate.report.record import Column, Table
 
 if TYPE_CHECKING:
     from dnacheck.model.chain import Chain
@@ -45,8 +45,8 @@ class _Lagrangian:
         self.chain, self.angles, self.multipliers = chain, angles, multipliers
 
     def closure(self, angles: Any) -> Any:
+        from dnacheck.equilibria.discrete.kernels.closure import closure_residual
         from dnacheck.model.chain import chain_frames
-        from dnacheck.ring.closure_kernels import closure_residual
 
         centres, frames = chain_frames(angles, self.chain.step_form)
         out = np.empty(6)
@@ -55,7 +55,11 @@ class _Lagrangian:
 
     def gradient(self, angles: Any) -> Any:
         """Closed form, flat (3N,); valid where the chain is closed."""
-        from dnacheck.ring.closure_kernels import closure_jacobian, energy_gradient, linearise
+        from dnacheck.equilibria.discrete.kernels.closure import (
+            closure_jacobian,
+            energy_gradient,
+            linearise,
+        )
 
         chain, n = self.chain, self.chain.n_steps
         centres, frames = np.empty((n + 1, 3)), np.empty((n + 1, 3, 3))
@@ -73,7 +77,7 @@ class _Lagrangian:
         The closed form may be given other, wrong multipliers. x = P^-1 b must satisfy: along x
         the gradient of the Lagrangian changes by b, up to multiples of the closure constraints.
         """
-        from dnacheck.ring.spectrum import ProjectedInverse
+        from dnacheck.equilibria.discrete.spectrum import ProjectedInverse
 
         given = self.multipliers if multipliers is None else multipliers
         inverse = ProjectedInverse(self.chain, self.angles, given)
@@ -116,8 +120,8 @@ class _Lagrangian:
 
 def derivatives(context: Context) -> Findings:
     """Closed-form derivatives against differences."""
+    from dnacheck.equilibria.discrete.search import find_rings
     from dnacheck.model.chain import elastic_energy
-    from dnacheck.ring.search import find_rings
 
     rng = context.rng()
     results = []
@@ -164,8 +168,8 @@ def _derivative(item: str, error: float) -> CheckResult:
 
 def convergence(context: Context) -> Findings:
     """Random molecules: every one must reach a stable minimum."""
-    from dnacheck.ring.discrete import NewtonOptions
-    from dnacheck.ring.search import find_rings, search_minima
+    from dnacheck.equilibria.discrete.search import find_rings, search_minima
+    from dnacheck.equilibria.discrete.solve import NewtonOptions
 
     rng = context.rng()
     count = _SEQUENCES[context.level]
@@ -222,7 +226,7 @@ def _count(item: str, words: str, culprits: list[str]) -> CheckResult:
 
 def growth(context: Context) -> Findings:
     """Long chains: convergence and linear cost."""
-    from dnacheck.ring.search import SearchOptions, find_rings
+    from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
 
     rng = context.rng()
     rows, results = [], []

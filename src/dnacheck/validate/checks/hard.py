@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from dnacheck.validate.cases import HardCase
-from dnacheck.validate.context import Context
-from dnacheck.validate.registry import Check, Findings, Group, Level
-from dnacheck.validate.scene import Scene
-from dnacheck.validate.sections import Block, Column, Figure, Table
-from dnacheck.validate.verdict import CheckResult, failed
+from dnacheck.validate.engine.context import Context
+from dnacheck.validate.engine.registry import Check, Findings, Group, Level
+from dnacheck.validate.engine.verdict import CheckResult, failed
+from dnacheck.validate.report.record import Block, Column, Figure, Table
+from dnacheck.validate.scene.scene import Scene
 
 _COLUMNS = (
     Column("title", "Case"),

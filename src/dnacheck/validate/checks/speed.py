@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dnacheck.validate.context import Context
-from dnacheck.validate.oracles import load_oracle, oracle_exists
-from dnacheck.validate.registry import Check, Findings, Group, Level
-from dnacheck.validate.sections import Column, Figure, Note, Table
-from dnacheck.validate.verdict import CheckResult, Rule, judge, must_fail
+from dnacheck.validate.engine.context import Context
+from dnacheck.validate.engine.registry import Check, Findings, Group, Level
+from dnacheck.validate.engine.verdict import CheckResult, Rule, judge, must_fail
+from dnacheck.validate.reference.oracles import load_oracle, oracle_exists
+from dnacheck.validate.report.record import Column, Figure, Note, Table
 
 if TYPE_CHECKING:
+    from dnacheck.equilibria.continuum import ContinuumRing
     from dnacheck.model.chain import Chain
     from dnacheck.model.rod import Rod
-    from dnacheck.ring.continuum import ContinuumRing
 
 FINER = 10.0
 """A reference is at least so many times finer than what it judges."""
@@ -76,7 +76,7 @@ def departure(energy: float, reference: float) -> float:
 
 def ring_energy(context: Context) -> Findings:
     """Continuum and discrete energies against references ten times finer."""
-    from dnacheck.validate import rings
+    from dnacheck.validate.engine import rings
 
     known = {molecule.name: molecule for molecule in context.molecules}
     molecule = known.get(_PREFERRED, context.molecules[0])
@@ -115,7 +115,7 @@ def ring_energy(context: Context) -> Findings:
 
 def continuum_reference(rod: Rod) -> tuple[ContinuumRing, float]:
     """The finest continuum ring, and how far another fine mesh of another degree is from it."""
-    from dnacheck.ring.continuum import (
+    from dnacheck.equilibria.continuum import (
         ContinuumOptions,
         lowest_continuum_ring,
         solve_continuum_ring,
@@ -130,7 +130,7 @@ def continuum_reference(rod: Rod) -> tuple[ContinuumRing, float]:
 
 
 def _coarse_doubt(rod: Rod, reference: ContinuumRing) -> float:
-    from dnacheck.ring.continuum import ContinuumOptions, solve_continuum_ring
+    from dnacheck.equilibria.continuum import ContinuumOptions, solve_continuum_ring
 
     coarse = ContinuumOptions(intervals=20, degree=4, adapt=False)
     ring = solve_continuum_ring(rod, reference.link, options=coarse)
@@ -139,7 +139,7 @@ def _coarse_doubt(rod: Rod, reference: ContinuumRing) -> float:
 
 def collocation_lines(rod: Rod, reference: ContinuumRing, floor: float) -> list[Line]:
     """Our collocation on uniform meshes, one line per degree."""
-    from dnacheck.ring.continuum import ContinuumOptions, solve_continuum_ring
+    from dnacheck.equilibria.continuum import ContinuumOptions, solve_continuum_ring
 
     lines = []
     for degree in _DEGREES:
@@ -160,7 +160,7 @@ def collocation_lines(rod: Rod, reference: ContinuumRing, floor: float) -> list[
 
 def adapted_line(rod: Rod, reference: ContinuumRing, floor: float) -> Line:
     """Our collocation with adapted mesh and error estimate."""
-    from dnacheck.ring.continuum import ContinuumOptions, solve_continuum_ring
+    from dnacheck.equilibria.continuum import ContinuumOptions, solve_continuum_ring
 
     line = Line("collocation, adapted")
     for tolerance in _ADAPTED:
@@ -197,9 +197,9 @@ def auto_line(
     auto = load_oracle("auto07p")
     if not auto.installed():
         return "AUTO-07p: not installed."
-    from dnacheck.ring.continuation.branch import ring_from
-    from dnacheck.ring.continuation.parameters import end_twist
-    from dnacheck.ring.continuum.collocation import discretise
+    from dnacheck.equilibria.continuation.branch import ring_from
+    from dnacheck.equilibria.continuation.parameters import end_twist
+    from dnacheck.equilibria.continuum.collocation import discretise
 
     before = reference.alpha - _AUTO_BEFORE
     disc = discretise(rod, reference.mesh, reference.degree)
@@ -221,9 +221,9 @@ def auto_line(
 
 def newton_line(chain: Chain) -> tuple[Line, float]:
     """The whole discrete search over Newton's tolerance, and its reference's own error."""
+    from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
+    from dnacheck.equilibria.discrete.solve import NewtonOptions
     from dnacheck.model.chain import Chain as AnyChain
-    from dnacheck.ring.discrete import NewtonOptions
-    from dnacheck.ring.search import SearchOptions, find_rings
 
     def energy(of: Chain, tolerance: float) -> float:
         options = SearchOptions(newton=NewtonOptions(tolerance=tolerance))
@@ -259,7 +259,7 @@ def _finer(item: str, doubt: float, smallest: float) -> CheckResult:
 
 def _promises(rod: Rod, reference: ContinuumRing) -> list[CheckResult]:
     """Adapted meshes keep the tolerance that they were given."""
-    from dnacheck.ring.continuum import ContinuumOptions, solve_continuum_ring
+    from dnacheck.equilibria.continuum import ContinuumOptions, solve_continuum_ring
 
     results = []
     for tolerance in _ADAPTED:

@@ -1,8 +1,8 @@
 """Drawings of the report. Each function takes an axis and plain data, and returns the axis.
 
 They compute nothing and leave matplotlib's settings alone; what is drawn was computed by a check.
-``KINDS`` names them for :class:`dnacheck.validate.sections.Figure`: each kind is a row of panels,
-one function per panel.
+``KINDS`` names them for :class:`dnacheck.validate.report.record.Figure`: each kind is a row of
+panels, one function per panel.
 """
 
 from __future__ import annotations

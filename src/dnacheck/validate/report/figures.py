@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import re
 
-from dnacheck.validate.sections import Figure
+from dnacheck.validate.report.record import Figure
 
 _PATH = re.compile(r' d="M [^"]*"')
 _PRECISE = re.compile(r"\d+\.\d{3,}")

@@ -9,11 +9,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dnacheck.validate.engine.verdict import CheckResult, Verdict
 from dnacheck.validate.report.figures import draw_svg
-from dnacheck.validate.report.glance import glance
+from dnacheck.validate.report.record import Block, Column, Figure, Note, Rings, Table
+from dnacheck.validate.report.summary import glance
 from dnacheck.validate.report.tables import cell_text, table_csv
-from dnacheck.validate.sections import Block, Column, Figure, Note, Rings, Table
-from dnacheck.validate.verdict import CheckResult, Verdict
 
 if TYPE_CHECKING:
     from dnacheck.validate.report.write import RunRecord

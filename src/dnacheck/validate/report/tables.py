@@ -7,7 +7,7 @@ import io
 import math
 from typing import Any
 
-from dnacheck.validate.sections import Column, Table
+from dnacheck.validate.report.record import Column, Table
 
 
 def cell_text(value: Any, digits: str) -> str:

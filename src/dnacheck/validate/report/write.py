@@ -11,13 +11,13 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from dnacheck.model.files import atomic_write
+from dnacheck.io.files import atomic_write
 from dnacheck.numerics.outcome import InputError
-from dnacheck.validate.plan import Plan
-from dnacheck.validate.registry import Findings
-from dnacheck.validate.scene import Scene
-from dnacheck.validate.sections import Section, Table
-from dnacheck.validate.verdict import CheckResult, Verdict, overall
+from dnacheck.validate.engine.plan import Plan
+from dnacheck.validate.engine.registry import Findings
+from dnacheck.validate.engine.verdict import CheckResult, Verdict, overall
+from dnacheck.validate.report.record import Section, Table
+from dnacheck.validate.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class RunRecord:
 
     def sections(self) -> list[Section]:
         """A section per group that ran."""
-        from dnacheck.validate.registry import groups
+        from dnacheck.validate.engine.registry import groups
 
         made = []
         for group in groups():

@@ -10,9 +10,9 @@ from dnacheck.validate.checks.jfactors.methods import laplace, pairwise
 from dnacheck.validate.checks.jfactors.straight import only_homopolymers, straight
 from dnacheck.validate.checks.jfactors.table3 import shifts, table3
 from dnacheck.validate.checks.jfactors.timing import speed
-from dnacheck.validate.registry import Check, Findings, Group
-from dnacheck.validate.scene import Scene
-from dnacheck.validate.sections import Block, Column, Table
+from dnacheck.validate.engine.registry import Check, Findings, Group
+from dnacheck.validate.report.record import Block, Column, Table
+from dnacheck.validate.scene.scene import Scene
 
 
 def assemble(findings: Mapping[str, Findings]) -> Sequence[Block]:
@@ -82,19 +82,19 @@ GROUP = Group(
     "Cyclization free energies −ln J with the entropy computed, by independent methods.",
     (
         Check("jfactor.laplace", "exact-closure sampling and Laplace", laplace, 4.0, _NEEDS,
-              requires=("dnacheck.jfactor.closure_sampling",)),
+              requires=("dnacheck.cyclization.closure.sampling",)),
         Check("jfactor.pairwise", "every two methods, half chains and Metropolis too", pairwise,
-              45.0, _NEEDS, requires=("dnacheck.jfactor.compare",)),
+              45.0, _NEEDS, requires=("dnacheck.validate.reference.agreement",)),
         Check("jfactor.acceptance", "Metropolis moves keep their distribution", acceptance, 12.0,
-              _NEEDS, requires=("dnacheck.jfactor.metropolis_kernels",)),
+              _NEEDS, requires=("dnacheck.cyclization.ensembles.kernels.open_moves",)),
         Check("jfactor.table3", "Table III", table3, 6.0, _NEEDS, applies=_paper,
-              requires=("dnacheck.jfactor.table3",)),
+              requires=("dnacheck.validate.reference.table3",)),
         Check("jfactor.shifts", "entropy shifts (Figures 17 to 19)", shifts, 5.0, _NEEDS,
-              applies=_paper, requires=("dnacheck.jfactor.table3",)),
+              applies=_paper, requires=("dnacheck.validate.reference.table3",)),
         Check("jfactor.straight", "straight molecules beside the rod", straight, 110.0, _NEEDS,
-              applies=only_homopolymers, requires=("dnacheck.jfactor.anharmonic",)),
+              applies=only_homopolymers, requires=("dnacheck.cyclization.laplace.anharmonic",)),
         Check("jfactor.speed", "error against time", speed, 25.0, _NEEDS, applies=_paper,
-              requires=("dnacheck.jfactor.speed",)),
+              requires=("dnacheck.validate.reference.work_precision",)),
     ),
     assemble,
 )  # fmt: skip

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dnacheck.validate.context import Context
-from dnacheck.validate.registry import Findings, Level
-from dnacheck.validate.sections import Column, Table
-from dnacheck.validate.verdict import CheckResult, Rule, judge, must_fail
+from dnacheck.validate.engine.context import Context
+from dnacheck.validate.engine.registry import Findings, Level
+from dnacheck.validate.engine.verdict import CheckResult, Rule, judge, must_fail
+from dnacheck.validate.report.record import Column, Table
 
 if TYPE_CHECKING:
     from dnacheck.model.chain import Chain
@@ -62,8 +62,8 @@ def _moved(
     chain: Chain, start: Array, moves: _Moves, rng: np.random.Generator, use_volume: bool = True
 ) -> tuple[Array, float]:
     """Every shape of ``start`` (M, N, 3) after some sweeps, and the fraction accepted."""
-    from dnacheck.jfactor import metropolis_kernels as mk
-    from dnacheck.jfactor.random_kernels import random_state
+    from dnacheck.cyclization.ensembles.kernels import open_moves as mk
+    from dnacheck.numerics.random_numbers import random_state
 
     stiffness = chain.energy_scale_RT * chain.stiffness
     state, accepted, mismatch = random_state(rng), np.zeros((3, 2)), np.empty(6)
@@ -128,8 +128,8 @@ _MEASURE = "change of the mean logarithm of the measure of rotations"
 
 def _closed_energy(chain: Chain, constrained: bool, seed: int) -> tuple[float, float]:
     """Mean energy (RT) of a closed ring and its standard error, by one kind of move."""
-    from dnacheck.jfactor.metropolis import ClosedRingOptions, closed_ring_ensemble
-    from dnacheck.ring.search import find_rings
+    from dnacheck.cyclization.ensembles.metropolis import ClosedRingOptions, closed_ring_ensemble
+    from dnacheck.equilibria.discrete.search import find_rings
 
     options = (
         ClosedRingOptions(samples=400, thinning=2, crankshafts=0, constrained=10)

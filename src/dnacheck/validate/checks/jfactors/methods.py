@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 from dnacheck.model.molecules import embedded_names
 from dnacheck.numerics.outcome import SolveError
 from dnacheck.validate.checks.jfactors.runs import BEST, chains, row, sampled
-from dnacheck.validate.context import Context
-from dnacheck.validate.registry import Findings, Level
-from dnacheck.validate.sections import Column, Table
-from dnacheck.validate.verdict import CheckResult, Rule, judge, must_fail
+from dnacheck.validate.engine.context import Context
+from dnacheck.validate.engine.registry import Findings, Level
+from dnacheck.validate.engine.verdict import CheckResult, Rule, judge, must_fail
+from dnacheck.validate.report.record import Column, Table
 
 if TYPE_CHECKING:
-    from dnacheck.jfactor.compare import CompareOptions
     from dnacheck.model.chain import Chain
+    from dnacheck.validate.reference.agreement import CompareOptions
 
 SIGMAS = 3.0
 """Methods must meet within so many combined standard errors."""
@@ -31,9 +31,9 @@ def _method_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table:
 
 def laplace(context: Context) -> Findings:
     """Laplace, plain and register-integrated, against exact-closure sampling."""
-    from dnacheck.jfactor.anharmonic import AnharmonicOptions, corrected_laplace
-    from dnacheck.jfactor.laplace import laplace as plain
-    from dnacheck.jfactor.register import register_laplace, register_profile
+    from dnacheck.cyclization.laplace.anharmonic import AnharmonicOptions, corrected_laplace
+    from dnacheck.cyclization.laplace.isolated import laplace as plain
+    from dnacheck.cyclization.laplace.register import register_laplace, register_profile
 
     wanted = context.scene.wanted.ln_J or 0.05
     results, rows = [], []
@@ -102,8 +102,8 @@ def laplace(context: Context) -> Findings:
 
 def pairwise(context: Context) -> Findings:
     """Every two methods on every molecule, against their standard errors."""
-    from dnacheck.jfactor.compare import compare_methods, differences, standard_error
-    from dnacheck.validate.rings import rings
+    from dnacheck.validate.engine.rings import rings
+    from dnacheck.validate.reference.agreement import compare_methods, differences, standard_error
 
     results: list[CheckResult] = []
     rows: list[dict[str, Any]] = []
@@ -181,7 +181,7 @@ _WORDS = {
 
 def _compared(context: Context) -> list[Chain]:
     """All molecules of a small scene; of a large one the shortest, the median and the longest."""
-    from dnacheck.validate.pilots import pilots
+    from dnacheck.validate.engine.pilots import pilots
 
     every = chains(context)
     return every if len(every) <= 12 or context.level is Level.FULL else pilots(every)
@@ -189,8 +189,8 @@ def _compared(context: Context) -> list[Chain]:
 
 def _effort(context: Context, chain: Chain, slow: bool) -> CompareOptions:
     """How long each method runs; the slow ones longest on the three best cyclizers."""
-    from dnacheck.jfactor.compare import CompareOptions
-    from dnacheck.jfactor.umbrella import UmbrellaOptions
+    from dnacheck.cyclization.umbrella.sampling import UmbrellaOptions
+    from dnacheck.validate.reference.agreement import CompareOptions
 
     best = chain.name in BEST
     if context.level is Level.FULL:

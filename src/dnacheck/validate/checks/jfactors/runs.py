@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from dnacheck.validate.context import Context
+from dnacheck.validate.engine.context import Context
 
 if TYPE_CHECKING:
-    from dnacheck.jfactor.result import JFactor
+    from dnacheck.cyclization.result import JFactor
     from dnacheck.model.chain import Chain
 
 BEST = ("09T15", "08T15", "08A17")
@@ -16,14 +16,14 @@ BEST = ("09T15", "08T15", "08A17")
 
 def sampled(chain: Chain, tolerance: float, seed: int) -> JFactor:
     """Exact-closure sampling to a standard error."""
-    from dnacheck.jfactor.closure_sampling import ClosureOptions, sample_closure
+    from dnacheck.cyclization.closure.sampling import ClosureOptions, sample_closure
 
     return sample_closure(chain, ClosureOptions(tolerance=tolerance), seed)
 
 
 def chains(context: Context) -> list[Chain]:
     """Chains of the scene's molecules."""
-    from dnacheck.validate.rings import scene_chain
+    from dnacheck.validate.engine.rings import scene_chain
 
     return [scene_chain(context.scene, molecule) for molecule in context.molecules]
 

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from dnacheck.validate.context import Context
-from dnacheck.validate.registry import Findings, Level
-from dnacheck.validate.scene import Scene
-from dnacheck.validate.sections import Column, Table
-from dnacheck.validate.verdict import CheckResult, Rule, judge
+from dnacheck.validate.engine.context import Context
+from dnacheck.validate.engine.registry import Findings, Level
+from dnacheck.validate.engine.verdict import CheckResult, Rule, judge
+from dnacheck.validate.report.record import Column, Table
+from dnacheck.validate.scene.scene import Scene
 
 _BASE_PAIRS_PER_TURN = 10.5
 _TOLERANCE = 0.05
@@ -25,13 +25,13 @@ def only_homopolymers(scene: Scene) -> str | None:
 
 def straight(context: Context) -> Findings:
     """Rods without bends, as long as the scene's molecules, by four methods and in closed form."""
-    from dnacheck.jfactor.anharmonic import AnharmonicOptions, corrected_laplace
-    from dnacheck.jfactor.closure_sampling import ClosureOptions, sample_closure
-    from dnacheck.jfactor.half_chain import HalfChainOptions, half_chain
-    from dnacheck.jfactor.register import register_profile
-    from dnacheck.jfactor.rod_limits import chain_rod_j
+    from dnacheck.cyclization.closure.sampling import ClosureOptions, sample_closure
+    from dnacheck.cyclization.half_chain.sampling import HalfChainOptions, half_chain
+    from dnacheck.cyclization.laplace.anharmonic import AnharmonicOptions, corrected_laplace
+    from dnacheck.cyclization.laplace.register import register_profile
+    from dnacheck.equilibria.discrete.search import find_rings
     from dnacheck.model.chain import Chain, uniform_stiffness
-    from dnacheck.ring.search import find_rings
+    from dnacheck.validate.reference.wormlike_chain import chain_rod_j
 
     full = context.level is Level.FULL
     model = context.scene.model

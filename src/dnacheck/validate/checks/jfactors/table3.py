@@ -7,18 +7,18 @@ from typing import Any
 import numpy as np
 
 from dnacheck.validate.checks.jfactors.runs import sampled
-from dnacheck.validate.context import Context
-from dnacheck.validate.published import PAPER
-from dnacheck.validate.registry import Findings
-from dnacheck.validate.sections import Column, Figure, Note, Table
-from dnacheck.validate.verdict import CheckResult, Rule, judge, must_fail
+from dnacheck.validate.engine.context import Context
+from dnacheck.validate.engine.registry import Findings
+from dnacheck.validate.engine.verdict import CheckResult, Rule, judge, must_fail
+from dnacheck.validate.reference.published import PAPER
+from dnacheck.validate.report.record import Column, Figure, Note, Table
 
 _SETS = {"trifonov2": "Trifonov II", "trifonov": "Trifonov", "desantis": "De Santis"}
 
 
 def table3(context: Context) -> Findings:
     """Table III, every column beside ours."""
-    from dnacheck.jfactor.table3 import PUBLISHED_SHIFTS, free_energy_table
+    from dnacheck.validate.reference.table3 import PUBLISHED_SHIFTS, free_energy_table
 
     seeds = iter(range(10_000))
     table = free_energy_table(
@@ -203,8 +203,8 @@ def papers_own() -> tuple[float, float]:
     fitted one 5.45 R.
     """
     from dnacheck.model.chain import PERSISTENCE_LENGTH_A, RISE_A
-    from dnacheck.validate.published import table2
-    from dnacheck.validate.published import table3 as published
+    from dnacheck.validate.reference.published import table2
+    from dnacheck.validate.reference.published import table3 as published
 
     rows = published()
     energies = np.array([table2()[name].continuum for name in rows])
@@ -217,7 +217,7 @@ def papers_own() -> tuple[float, float]:
 
 def shifts(context: Context) -> Findings:
     """Figures 17 to 19."""
-    from dnacheck.jfactor.table3 import shift_sweep
+    from dnacheck.validate.reference.table3 import shift_sweep
 
     del context
     figures, rows = [], []

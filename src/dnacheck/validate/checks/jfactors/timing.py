@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dnacheck.validate.context import Context
-from dnacheck.validate.registry import Findings, Level
-from dnacheck.validate.sections import Block, Column, Figure, Note, Table
-from dnacheck.validate.verdict import CheckResult, Rule, judge
+from dnacheck.validate.engine.context import Context
+from dnacheck.validate.engine.registry import Findings, Level
+from dnacheck.validate.engine.verdict import CheckResult, Rule, judge
+from dnacheck.validate.report.record import Block, Column, Figure, Note, Table
 
 _LABELS = {
     "laplace": "Laplace (bias)",
@@ -22,7 +22,13 @@ _SIGMAS = 4.0
 
 def speed(context: Context) -> Findings:
     """Every method at several sizes on an easy, a middling and a hard molecule."""
-    from dnacheck.jfactor.speed import LONG, SpeedOptions, molecules, study, warm_up
+    from dnacheck.validate.reference.work_precision import (
+        LONG,
+        SpeedOptions,
+        molecules,
+        study,
+        warm_up,
+    )
 
     options = LONG if context.level is Level.FULL else SpeedOptions()
     warm_up()

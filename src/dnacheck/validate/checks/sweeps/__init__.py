@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dnacheck.validate.checks.sweeps.diagrams import imperfect, perfect
 from dnacheck.validate.checks.sweeps.ratios import ratios, robustness
-from dnacheck.validate.registry import Check, Group
-from dnacheck.validate.scene import Scene
+from dnacheck.validate.engine.registry import Check, Group
+from dnacheck.validate.scene.scene import Scene
 
-_MODULE = "dnacheck.ring.continuation.figures"
+_MODULE = "dnacheck.equilibria.continuation.figures"
 
 
 def _applies(scene: Scene) -> str | None:

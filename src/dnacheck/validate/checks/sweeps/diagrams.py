@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dnacheck.validate.context import Context
-from dnacheck.validate.published import PAPER
-from dnacheck.validate.registry import Findings
-from dnacheck.validate.sections import Column, Figure, Table
-from dnacheck.validate.verdict import CheckResult, Rule, judge, must_fail
+from dnacheck.validate.engine.context import Context
+from dnacheck.validate.engine.registry import Findings
+from dnacheck.validate.engine.verdict import CheckResult, Rule, judge, must_fail
+from dnacheck.validate.reference.published import PAPER
+from dnacheck.validate.report.record import Column, Figure, Table
 
 if TYPE_CHECKING:
     from dnacheck.model.chain import Chain
@@ -22,7 +22,7 @@ _SHOWN_POINTS = 400
 
 
 def chain_of(context: Context, name: str, angles: str | None = None) -> Chain:
-    from dnacheck.validate.rings import scene_chain
+    from dnacheck.validate.engine.rings import scene_chain
 
     known = {molecule.name: molecule for molecule in context.molecules}
     return scene_chain(context.scene, known.get(name, context.molecules[0]), angles)
@@ -47,7 +47,7 @@ def _thinned(component: Mapping[str, Any]) -> dict[str, Any]:
 
 def perfect(context: Context) -> Findings:
     """The perfect diagram against closed forms."""
-    from dnacheck.ring.continuation.figures import figure_6
+    from dnacheck.equilibria.continuation.figures import figure_6
 
     n, ratio = 158, 1.5
     component = figure_6(n, ratio)
@@ -105,11 +105,11 @@ def perfect(context: Context) -> Findings:
 
 def imperfect(context: Context) -> Findings:
     """The diagram of 11T15 and its two cyclized solutions."""
-    from dnacheck.ring.continuation.diagram import lowest_component
-    from dnacheck.ring.continuation.figures import component_data, marked_rings, ring_shape
-    from dnacheck.ring.discrete import NewtonOptions, solve_ring
-    from dnacheck.ring.reconstruct import reconstruct
-    from dnacheck.validate import rings
+    from dnacheck.equilibria.bridge.reconstruct import reconstruct
+    from dnacheck.equilibria.continuation.diagram import lowest_component
+    from dnacheck.equilibria.continuation.figures import component_data, marked_rings, ring_shape
+    from dnacheck.equilibria.discrete.solve import NewtonOptions, solve_ring
+    from dnacheck.validate.engine import rings
 
     chain = chain_of(context, "11T15")
     options = rings.rod_options(context.scene)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from dnacheck.validate.checks.sweeps.diagrams import chain_of
-from dnacheck.validate.context import Context
-from dnacheck.validate.published import PAPER
-from dnacheck.validate.registry import Findings
-from dnacheck.validate.sections import Column, Figure, Table
-from dnacheck.validate.verdict import CheckResult, Rule, judge
+from dnacheck.validate.engine.context import Context
+from dnacheck.validate.engine.registry import Findings
+from dnacheck.validate.engine.verdict import CheckResult, Rule, judge
+from dnacheck.validate.reference.published import PAPER
+from dnacheck.validate.report.record import Column, Figure, Table
 
 ANGLE_SETS = ("trifonov", "desantis", "trifonov2")
 _FIGURE_OF = {"trifonov": "Figure 12", "desantis": "Figure 13", "trifonov2": "Figure 14"}
@@ -18,9 +18,9 @@ _TITLES = {"trifonov": "Trifonov", "desantis": "De Santis", "trifonov2": "Trifon
 
 def ratios(context: Context) -> Findings:
     """Energies over the twist ratio for three angle sets."""
-    from dnacheck.ring.continuation.figures import sweeps
-    from dnacheck.validate import rings
-    from dnacheck.validate.rings import scene_chain
+    from dnacheck.equilibria.continuation.figures import sweeps
+    from dnacheck.validate.engine import rings
+    from dnacheck.validate.engine.rings import scene_chain
 
     options = rings.rod_options(context.scene)
     results: list[CheckResult] = []
@@ -155,7 +155,7 @@ def _sweep_results(
 
 def robustness(context: Context) -> Findings:
     """Energies over the choices of filter and fit."""
-    from dnacheck.ring.continuation.figures import robustness as figure_10
+    from dnacheck.equilibria.continuation.figures import robustness as figure_10
 
     chain = chain_of(context, "08T15")
     data = figure_10(chain)

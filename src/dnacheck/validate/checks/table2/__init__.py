@@ -5,8 +5,8 @@ from __future__ import annotations
 from dnacheck.validate.checks.table2.controls import controls
 from dnacheck.validate.checks.table2.energies import continuum, discrete, gap
 from dnacheck.validate.checks.table2.shapes import shape
-from dnacheck.validate.registry import Check, Group, Level
-from dnacheck.validate.scene import Scene
+from dnacheck.validate.engine.registry import Check, Group, Level
+from dnacheck.validate.scene.scene import Scene
 
 
 def _applies(scene: Scene) -> str | None:

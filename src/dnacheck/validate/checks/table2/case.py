@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from dnacheck.validate.context import Context
-from dnacheck.validate.published import ENERGY_ROUNDING, PAPER, PublishedRing, table2
-from dnacheck.validate.verdict import CheckResult, Rule, judge
+from dnacheck.validate.engine.context import Context
+from dnacheck.validate.engine.verdict import CheckResult, Rule, judge
+from dnacheck.validate.reference.published import ENERGY_ROUNDING, PAPER, PublishedRing, table2
 
 if TYPE_CHECKING:
+    from dnacheck.equilibria.bridge.reconstruct import Reconstruction
+    from dnacheck.equilibria.continuum import ContinuumRing
+    from dnacheck.equilibria.discrete.solve import DiscreteRing
     from dnacheck.model.chain import Chain
-    from dnacheck.ring.continuum import ContinuumRing
-    from dnacheck.ring.discrete import DiscreteRing
-    from dnacheck.ring.reconstruct import Reconstruction
 
 DISCRETE_TOLERANCE = 5e-4
 CONTINUUM_TOLERANCE = 1.5e-3
@@ -28,8 +28,8 @@ class Case:
     """A molecule of Table II with its rings, ours and the paper's."""
 
     def __init__(self, context: Context, name: str) -> None:
-        from dnacheck.ring.reconstruct import reconstruct, rms_difference
-        from dnacheck.validate import rings
+        from dnacheck.equilibria.bridge.reconstruct import reconstruct, rms_difference
+        from dnacheck.validate.engine import rings
 
         self.name = name
         molecule = next(item for item in context.molecules if item.name == name)

@@ -11,17 +11,17 @@ from dnacheck.validate.checks.table2.case import (
     judge_discrete,
     judge_shape,
 )
-from dnacheck.validate.context import Context
-from dnacheck.validate.registry import Findings
-from dnacheck.validate.verdict import must_fail
+from dnacheck.validate.engine.context import Context
+from dnacheck.validate.engine.registry import Findings
+from dnacheck.validate.engine.verdict import must_fail
 
 
 def controls(context: Context) -> Findings:
     """Table II must refuse what is wrong."""
+    from dnacheck.equilibria.discrete.search import find_rings
     from dnacheck.model.chain import Chain
     from dnacheck.model.molecules import Molecule
-    from dnacheck.ring.search import find_rings
-    from dnacheck.validate import rings
+    from dnacheck.validate.engine import rings
 
     case = cases(context)[0]
     chain, published = case.chain, case.published

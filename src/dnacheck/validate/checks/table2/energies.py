@@ -14,9 +14,9 @@ from dnacheck.validate.checks.table2.case import (
     judge_gap,
     judge_shape,
 )
-from dnacheck.validate.context import Context
-from dnacheck.validate.registry import Findings
-from dnacheck.validate.sections import Column, Table
+from dnacheck.validate.engine.context import Context
+from dnacheck.validate.engine.registry import Findings
+from dnacheck.validate.report.record import Column, Table
 
 
 def discrete(context: Context) -> Findings:
@@ -101,9 +101,9 @@ def _row(case: Case) -> dict[str, Any]:
 
 
 def _details(found: list[Case], context: Context) -> Table:
-    from dnacheck.ring.continuum import lowest_continuum_ring
-    from dnacheck.ring.search import find_rings
-    from dnacheck.validate import rings
+    from dnacheck.equilibria.continuum import lowest_continuum_ring
+    from dnacheck.equilibria.discrete.search import find_rings
+    from dnacheck.validate.engine import rings
 
     rows = []
     for case in found:

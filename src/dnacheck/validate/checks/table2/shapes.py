@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from dnacheck.validate.checks.table2.case import Case, cases, judge_centres, judge_shape
-from dnacheck.validate.context import Context
-from dnacheck.validate.registry import Findings
-from dnacheck.validate.sections import Figure, Rings
+from dnacheck.validate.engine.context import Context
+from dnacheck.validate.engine.registry import Findings
+from dnacheck.validate.report.record import Figure, Rings
 
 _HELIX_2, _HELIX_1 = 2.521, -0.769
 """Sugar-phosphate helices r ± 2.521 d2 - 0.769 d1 in steps (caption of Figure 11)."""

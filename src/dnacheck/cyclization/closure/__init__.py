@@ -1,0 +1,1 @@
+"""Importance sampling of exactly closed shapes."""

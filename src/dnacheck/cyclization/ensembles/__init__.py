@@ -1,0 +1,1 @@
+"""Metropolis ensembles of free and of closed chains."""

@@ -1,0 +1,273 @@
+"""Where tilted sampling is centred: the minima of all links, and shapes along their softest mode.
+
+A tilt is a closed shape q* with the Gaussian of the free chain moved there. With K the stiffness
+in RT and q^ the ground angles, a chain drawn from it is free-chain distributed with the weight
+exp(-E* - g.(q - q*)), g = K (q* - q^), E* its elastic energy (docs/theory/jfactors.md). At an
+equilibrium g = -G^T m, so on closed chains the exponent vanishes to first order, and off them it
+is m.c, c the closure mismatch.
+
+Along the softest mode of a minimum, usually its register, closed chains spread further than the
+tilted Gaussian does, which gives the weights a heavy tail. Closed shapes along that mode, a fixed
+number of the Gaussian's standard deviations apart, make a mixture without it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dnacheck.cyclization.result import JStatus
+from dnacheck.equilibria.discrete.kernels.closure import (
+    closure_jacobian,
+    closure_residual,
+    energy_gradient,
+    linearise,
+)
+from dnacheck.equilibria.discrete.kernels.factorisation import FACTOR_WIDTH, factorise
+from dnacheck.equilibria.discrete.search import RingSearch
+from dnacheck.equilibria.discrete.spectrum import ProjectedInverse
+from dnacheck.model.chain import Chain
+from dnacheck.numerics.outcome import SolveError
+
+Array = NDArray[np.float64]
+
+_SPACING = 1.5
+"""Distance between neighbouring tilts in standard deviations of the tilted Gaussian."""
+_SOFT_RATIO = 0.5
+"""Projected Hessian over stiffness below which one tilt's weights have no finite variance:
+the weights' square times the Gaussian has the inverse covariance 2H - K."""
+_WINDOW_RT = 8.0
+"""Minima this far above the lowest add less than a part in a thousand to J."""
+_REACH_RT = 6.0
+_MOST_PER_SIDE = 24
+_CURVATURE_LIMIT = 6.0
+"""Bound on the curvature of ln J in the mismatch, in its own standard deviations; a zero mode
+makes it infinite, and the window is far smaller than one standard deviation."""
+_POWER_STEPS = 40
+_PROJECTIONS = 12
+_CLOSED = 1e-11
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """Closure of a chain in given angles, to first order.
+
+    Attributes
+    ----------
+    jacobian : ndarray, shape (6, 3N)
+        End displacement (steps) and rotation (radians) per radian of each angle.
+    spread : ndarray, shape (6, 6)
+        G K^-1 G^T in RT: covariance of the mismatch of chains drawn about these angles.
+    multipliers : ndarray, shape (6,)
+        Least-squares m of gradient + G^T m = 0 in the norm of K^-1, in RT; exact at equilibrium.
+    curvature : ndarray, shape (6, 6)
+        (G H^-1 G^T)^-1 in RT: curvature of the lowest energy in the mismatch.
+    """
+
+    jacobian: Array
+    spread: Array
+    multipliers: Array
+    curvature: Array
+
+
+@dataclass(frozen=True)
+class Tilt:
+    """One centre of the mixture.
+
+    Attributes
+    ----------
+    angles : ndarray, shape (N, 3)
+        Closed shape q* in radians.
+    pull : ndarray, shape (N, 3)
+        g = K (q* - q^) in RT per radian.
+    energy_RT : float
+    link : int
+        Link of the minimum that it belongs to.
+    share : float
+        Fraction of the draws.
+    at_joint : Linearisation
+        Closure of the chain cut between its two halves, in the frame of the joint.
+    """
+
+    angles: Array
+    pull: Array
+    energy_RT: float
+    link: int
+    share: float
+    at_joint: Linearisation
+
+
+def rolled(chain: Chain, angles: Array, joint: int) -> tuple[Array, Array, Array]:
+    """Angles, ground and stiffness of the ring cut at base pair ``joint`` instead of the first."""
+    return (
+        np.ascontiguousarray(np.roll(angles, -joint, axis=0)),
+        np.ascontiguousarray(np.roll(chain.ground, -joint, axis=0)),
+        np.ascontiguousarray(np.roll(chain.stiffness, -joint, axis=0)),
+    )
+
+
+def linearised_closure(chain: Chain, angles: Array, joint: int = 0) -> Linearisation:
+    """Closure, multipliers and curvature of a closed shape (N, 3), cut at base pair ``joint``."""
+    q, ground, stiffness = rolled(chain, angles, joint)
+    n = chain.n_steps
+    form = chain.form_code
+    centres, frames = np.empty((n + 1, 3)), np.empty((n + 1, 3, 3))
+    axes, gradient = np.empty((n, 3, 3)), np.empty((n, 3))
+    halves = np.empty((n if form else 0, 5, 3))
+    linearise(q, form, centres, frames, axes, halves)
+    energy_gradient(q, ground, stiffness, gradient)
+    jacobian = np.empty((6, 3 * n))
+    closure_jacobian(centres, axes, jacobian)
+    flexibility = np.linalg.inv(stiffness)
+    weighted = np.einsum("sij,csj->csi", flexibility, jacobian.reshape(6, n, 3)).reshape(6, -1)
+    spread = weighted @ jacobian.T
+    multipliers = -np.linalg.solve(spread, weighted @ gradient.ravel())
+    factors, small = np.empty((n, FACTOR_WIDTH)), np.empty((6, 7))
+    factorise(gradient, stiffness, 0.0, form, centres, axes, halves, multipliers, factors, small)
+    scale = chain.energy_scale_RT
+    return Linearisation(
+        jacobian=jacobian,
+        spread=spread / scale,
+        multipliers=scale * multipliers,
+        curvature=_bounded_curvature(small[:, :6] / scale, spread / scale),
+    )
+
+
+def _bounded_curvature(flexibility: Array, spread: Array) -> Array:
+    """Inverse of a symmetric (6, 6) with its eigenvalues bounded in units of ``spread``."""
+    root = np.linalg.cholesky(spread)
+    inverse_root = np.linalg.inv(root)
+    values, vectors = np.linalg.eigh(inverse_root @ flexibility @ inverse_root.T)
+    floor = 1.0 / _CURVATURE_LIMIT
+    sign = np.where(values < 0.0, -1.0, 1.0)
+    bounded = sign / np.maximum(np.abs(values), floor)
+    whole: Array = inverse_root.T @ (vectors * bounded) @ vectors.T @ inverse_root
+    return whole
+
+
+def _energy_RT(chain: Chain, angles: Array) -> tuple[float, Array]:
+    gradient = np.empty_like(chain.ground)
+    energy = energy_gradient(angles, chain.ground, chain.stiffness, gradient)
+    return chain.energy_scale_RT * energy, chain.energy_scale_RT * gradient
+
+
+def close_chain(chain: Chain, angles: Array) -> Array | None:
+    """The nearest closed shape in the norm of the stiffness, to first order; None if not found."""
+    n, form = chain.n_steps, chain.form_code
+    q = np.array(angles, dtype=float)
+    centres, frames = np.empty((n + 1, 3)), np.empty((n + 1, 3, 3))
+    axes, halves = np.empty((n, 3, 3)), np.empty((n if form else 0, 5, 3))
+    jacobian, residual = np.empty((6, 3 * n)), np.empty(6)
+    flexibility = np.linalg.inv(chain.stiffness)
+    for _ in range(_PROJECTIONS):
+        linearise(q, form, centres, frames, axes, halves)
+        closure_residual(centres, frames, residual)
+        if not np.isfinite(residual).all():
+            return None
+        if np.abs(residual).max() < _CLOSED * n:
+            return q
+        closure_jacobian(centres, axes, jacobian)
+        weighted = np.einsum("sij,csj->csi", flexibility, jacobian.reshape(6, n, 3)).reshape(6, -1)
+        q -= (np.linalg.solve(weighted @ jacobian.T, residual) @ weighted).reshape(n, 3)
+    return None
+
+
+def softest_direction(
+    chain: Chain, angles: Array, multipliers: Array, guess: Array | None = None
+) -> tuple[Array, float]:
+    """Softest closed change of shape in the norm of K, and its Hessian over stiffness.
+
+    The direction (N, 3) has unit length in that norm (RT): one standard deviation of the free
+    Gaussian. Power iteration on the projected inverse Hessian; ``multipliers`` are reduced.
+    """
+    inverse = ProjectedInverse(chain, angles, multipliers)
+    scale = chain.energy_scale_RT
+    x = np.random.default_rng(0).standard_normal(angles.shape) if guess is None else guess.copy()
+    growth = 1.0
+    for _ in range(_POWER_STEPS):
+        y = inverse(np.einsum("sij,sj->si", chain.stiffness, x))
+        growth = float(np.sum(x * np.einsum("sij,sj->si", chain.stiffness, y))) / float(
+            np.sum(x * np.einsum("sij,sj->si", chain.stiffness, x))
+        )
+        size = float(np.sqrt(scale * np.einsum("si,sij,sj->", y, chain.stiffness, y)))
+        if not (np.isfinite(size) and size > 0.0):
+            break
+        x = y / size
+    return x, 1.0 / growth if growth else np.inf
+
+
+def _distance(chain: Chain, a: Array, b: Array) -> float:
+    d = a - b
+    return float(np.sqrt(chain.energy_scale_RT * np.einsum("si,sij,sj->", d, chain.stiffness, d)))
+
+
+def _walk(chain: Chain, start: Array, direction: Array, ceiling: float, known: list[Array]) -> None:
+    """Append closed shapes along the softest mode until the energy or a known shape stops it."""
+    q, way = start, direction
+    for _ in range(_MOST_PER_SIDE):
+        moved = close_chain(chain, q + _SPACING * way)
+        if moved is None or _energy_RT(chain, moved)[0] > ceiling:
+            return
+        if any(_distance(chain, moved, other) < 0.75 * _SPACING for other in known):
+            return
+        known.append(moved)
+        multipliers = linearised_closure(chain, moved).multipliers / chain.energy_scale_RT
+        new, _ = softest_direction(chain, moved, multipliers, guess=way)
+        along = float(np.einsum("si,sij,sj->", new, chain.stiffness, way))
+        q, way = moved, new if along > 0.0 else -new
+
+
+def centre_shapes(search: RingSearch) -> list[tuple[Array, Array, int]]:
+    """Angles (N, 3), reduced multipliers (6,) and link of the shapes that sampling starts from.
+
+    They are the minima of the search, and the one ring of a family with a free register that it
+    found; a tilt need not be an isolated minimum.
+
+    Raises
+    ------
+    SolveError
+        There is none.
+    """
+    chain = search.chain
+    shapes = [(r.angles, r.multipliers, r.link) for r in search.equilibria if r.stable is not False]
+    if not shapes:
+        raise SolveError(
+            f"J factor of {chain.name}: no stable ring at links "
+            f"{', '.join(map(str, search.links_searched))}; {JStatus.NOT_FOUND.value}",
+            search,
+        )
+    lowest = min(_energy_RT(chain, shape[0])[0] for shape in shapes)
+    return [shape for shape in shapes if _energy_RT(chain, shape[0])[0] < lowest + _WINDOW_RT]
+
+
+def ring_tilts(search: RingSearch, joint: int) -> tuple[Tilt, ...]:
+    """Tilts that cover the stable minima of a search, for halves that meet at base pair ``joint``.
+
+    Shares fall with half the energy, so that higher shapes are still sampled.
+
+    Raises
+    ------
+    SolveError
+        No stable ring at any link searched.
+    """
+    chain = search.chain
+    shapes = centre_shapes(search)
+    lowest = min(_energy_RT(chain, shape[0])[0] for shape in shapes)
+    known: list[Array] = [np.array(shape[0]) for shape in shapes]
+    links = [shape[2] for shape in shapes]
+    for angles, multipliers, link in shapes:
+        way, ratio = softest_direction(chain, angles, multipliers)
+        if not abs(ratio) < _SOFT_RATIO:
+            continue
+        for side in (1.0, -1.0):
+            _walk(chain, angles, side * way, lowest + _REACH_RT, known)
+        links += [link] * (len(known) - len(links))
+    energies, pulls = zip(*(_energy_RT(chain, q) for q in known), strict=True)
+    log_shares = -0.5 * (np.array(energies) - lowest)
+    shares = np.exp(log_shares) / np.exp(log_shares).sum()
+    return tuple(
+        Tilt(q, pull, energy, link, float(share), linearised_closure(chain, q, joint))
+        for q, pull, energy, link, share in zip(known, pulls, energies, links, shares, strict=True)
+    )

@@ -1,0 +1,364 @@
+"""J factors by half chains: first and second halves drawn apart, all pairs that meet counted.
+
+After Alexandrowicz (1969), Levene & Crothers (1986) and Czapla, Swigon & Olson (2006). M first and
+M second halves make M^2 chains; those that meet within a window about closure, divided by the
+window's volume, estimate the density f of closure, and J = f / l^3 in mol/L
+(docs/theory/jfactors.md).
+
+Plain sampling draws both halves from the free chain. Tilted sampling draws them from a mixture of
+Gaussians centred on closed shapes (:mod:`dnacheck.cyclization.half_chain.proposals`). The density
+of the pairs is the product of the two halves' mixture densities, whatever component each half came
+from, so a half drawn as a fixed share of the mixture has the weight p / sum_k share_k p_k of its
+own and a pair has the product of the two.
+
+A window of finite size has a bias. It is taken away in three steps: each pair is weighted with
+exp(-m.c + c.S.c / 2), the inverse of how the density varies with the mismatch c to second order;
+what is left is even in c, and is extrapolated to windows of zero size with a straight line in the
+square of the window's radius, fitted to shells of the same samples; a parabola in place of the
+line bounds the rest.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dnacheck.cyclization.half_chain.kernels.pairs import fill_cells, half_poses, match_pairs, weigh
+from dnacheck.cyclization.half_chain.proposals import Tilt, ring_tilts
+from dnacheck.cyclization.half_chain.window import HalfChainEstimate, PairSums, window_estimate
+from dnacheck.cyclization.result import JFactor, JStatus
+from dnacheck.equilibria.discrete.search import RingSearch, find_rings
+from dnacheck.model.chain import Chain
+from dnacheck.numerics.outcome import InputError, SolveError
+from dnacheck.numerics.statistics import HEAVY_PARETO_SHAPE
+
+Array = NDArray[np.float64]
+
+_MOST_CELLS = 2_000_000
+_LARGEST_SHARE = 0.1
+"""One half that carries more than this fraction of J is reported as a heavy tail."""
+
+
+@dataclass(frozen=True)
+class HalfChainOptions:
+    """How many halves are drawn, and how close a pair must meet.
+
+    Attributes
+    ----------
+    halves : int
+        First halves drawn, and as many second halves.
+    batches : int
+        Independent sets that they are drawn in; all pairs of sets are matched, and the standard
+        error comes from how the pairs of sets differ.
+    tilted : bool
+        Draw from the mixture of tilts; otherwise from the free chain.
+    radius : float
+        Largest mismatch of a pair, in standard deviations of the mismatch of tilted chains
+        (about 25 steps and 1 rad each for 150 base pairs, correlated).
+    shells : int
+        Shells of equal width in the square of the mismatch, for the extrapolation.
+    windows : tuple of float
+        Radii over ``radius`` at which the uncorrected estimate is reported.
+    threads : int
+        Threads used; the result does not depend on it.
+    """
+
+    halves: int = 20_000
+    batches: int = 16
+    tilted: bool = True
+    radius: float = 0.6
+    shells: int = 24
+    windows: tuple[float, ...] = (1.0, 0.85, 0.7, 0.55)
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        if self.batches < 4:
+            raise InputError(f"batches must be at least 4, not {self.batches}")
+        if self.halves < 10 * self.batches:
+            raise InputError(f"halves must be at least 10 a batch, not {self.halves}")
+        if not 0.0 < self.radius <= 2.0:
+            raise InputError(f"window radius must lie in (0, 2], not {self.radius}")
+        if self.shells < 6:
+            raise InputError(f"shells must be at least 6, not {self.shells}")
+        if self.threads < 1:
+            raise InputError(f"threads must be at least 1, not {self.threads}")
+        if not all(0.0 < w <= 1.0 for w in self.windows):
+            raise InputError("window radii are fractions in (0, 1]")
+
+
+@dataclass(frozen=True)
+class _Halves:
+    poses: Array  # (M, 7), position in steps and quaternion
+    log_weights: Array  # (M,)
+    scores: Array  # (M, K)
+
+    @staticmethod
+    def joined(parts: list[_Halves]) -> _Halves:
+        return _Halves(
+            np.concatenate([part.poses for part in parts]),
+            np.concatenate([part.log_weights for part in parts]),
+            np.concatenate([part.scores for part in parts]),
+        )
+
+    def taken(self, order: NDArray[np.int64]) -> _Halves:
+        return _Halves(self.poses[order], self.log_weights[order], self.scores[order])
+
+
+class _Sampler:
+    """Draws the halves of one side of the joint."""
+
+    def __init__(self, chain: Chain, tilts: tuple[Tilt, ...], steps: slice, tilted: bool) -> None:
+        stiffness = chain.energy_scale_RT * chain.stiffness[steps]
+        self.roots = np.linalg.cholesky(np.linalg.inv(stiffness))
+        self.ground = np.ascontiguousarray(chain.ground[steps])
+        self.centres = [np.ascontiguousarray(tilt.angles[steps]) for tilt in tilts]
+        self.pulls = np.array([tilt.pull[steps] for tilt in tilts])
+        strains = np.array([centre - self.ground for centre in self.centres])
+        self.energies = 0.5 * np.einsum("ksi,ksi->k", self.pulls, strains)
+        self.shares = np.array([tilt.share for tilt in tilts])
+        self.tilted = tilted
+        self.backward = steps.start != 0
+        self.form = chain.form_code
+
+    def counts(self, total: int) -> NDArray[np.int64]:
+        """Draws of each component: its share by largest remainder, but one at least."""
+        wanted = self.shares * total
+        counts = np.maximum(np.floor(wanted).astype(np.int64), 1)
+        missing = total - int(counts.sum())
+        order = np.argsort(counts - wanted, kind="stable")
+        counts[order[: max(missing, 0)]] += 1
+        if missing < 0:
+            counts[np.argmax(counts)] += missing
+        return counts
+
+    def draw(self, total: int, rng: np.random.Generator) -> _Halves:
+        counts = self.counts(total) if self.tilted else np.array([total])
+        centres = self.centres if self.tilted else [self.ground]
+        poses = np.empty((total, 7))
+        scores, log_weights = np.empty((total, len(self.shares))), np.zeros(total)
+        done = 0
+        for centre, count in zip(centres, counts, strict=True):
+            part = slice(done, done + count)
+            half_poses(
+                rng.standard_normal((count, *self.ground.shape)),
+                self.roots,
+                centre,
+                self.ground,
+                self.pulls,
+                self.energies,
+                self.form,
+                self.backward,
+                poses[part, :3],
+                poses[part, 3:],
+                scores[part],
+            )
+            done += count
+        if self.tilted:
+            weigh(scores, np.log(counts / total), log_weights)
+        return _Halves(poses, log_weights, scores)
+
+
+def _map(work: Callable[[int], object], count: int, threads: int) -> list[object]:
+    if threads == 1:
+        return [work(i) for i in range(count)]
+    with ThreadPoolExecutor(threads) as pool:
+        return list(pool.map(work, range(count)))
+
+
+class _Grid:
+    """First halves sorted into cells of space and, within a cell, by one part of the rotation."""
+
+    def __init__(self, halves: _Halves, batches: NDArray[np.int64], reach: float) -> None:
+        positions = halves.poses[:, :3]
+        low, high = positions.min(axis=0), positions.max(axis=0)
+        size = 0.5 * reach
+        while np.prod(np.floor((high - low) / size) + 1.0) > _MOST_CELLS:
+            size *= 1.25
+        self.low, self.size = low, size
+        self.shape = (np.floor((high - low) / size) + 1.0).astype(np.int64)
+        cells = np.empty(len(positions), np.int64)
+        fill_cells(positions, low, size, self.shape, cells)
+        order = np.lexsort((np.abs(halves.poses[:, 3]), cells))
+        self.halves = halves.taken(order)
+        self.batches = batches[order]
+        self.starts = np.searchsorted(cells[order], np.arange(int(np.prod(self.shape)) + 1))
+
+
+def _matched(
+    grid: _Grid, second: list[_Halves], tilts: tuple[Tilt, ...], options: HalfChainOptions
+) -> PairSums:
+    links = sorted({tilt.link for tilt in tilts})
+    roots = np.array([np.linalg.cholesky(tilt.at_joint.spread) for tilt in tilts])
+    spreads = np.array([tilt.at_joint.spread for tilt in tilts])
+    turns = np.sqrt(np.linalg.eigvalsh(spreads[:, 3:, 3:])[:, -1])
+    moves = np.sqrt(np.linalg.eigvalsh(spreads[:, :3, :3])[:, -1])
+    fixed = (
+        np.log([tilt.share for tilt in tilts]),
+        np.linalg.inv(roots),
+        np.log(roots[:, range(6), range(6)]).sum(axis=1),
+        np.ascontiguousarray(spreads[:, :3, :3]),
+        np.column_stack([moves, turns]),
+        np.array([tilt.at_joint.multipliers for tilt in tilts]),
+        np.array([tilt.at_joint.curvature for tilt in tilts]),
+        np.array([links.index(tilt.link) for tilt in tilts]),
+    )
+    first = grid.halves
+
+    def work(b: int) -> tuple[Array, NDArray[np.int64], Array, Array]:
+        sums = np.zeros((options.batches, len(links), options.shells))
+        counts = np.zeros(options.shells, np.int64)
+        rows, columns = np.zeros(len(first.log_weights)), np.zeros(len(second[b].log_weights))
+        match_pairs(
+            first.poses,
+            first.log_weights,
+            first.scores,
+            grid.batches,
+            grid.starts,
+            grid.low,
+            grid.size,
+            grid.shape,
+            second[b].poses,
+            second[b].log_weights,
+            second[b].scores,
+            *fixed,
+            options.radius,
+            options.shells,
+            sums,
+            counts,
+            rows,
+            columns,
+        )
+        return sums, counts, rows, columns
+
+    parts = _map(work, options.batches, options.threads)
+    tables, counts, rows, columns = zip(*parts, strict=True)
+    return PairSums(
+        table=np.stack(tables, axis=1),
+        counts=np.sum(counts, axis=0),
+        rows=np.sum(rows, axis=0),
+        columns=np.concatenate(columns),
+    )
+
+
+def half_chain_estimate(
+    search: RingSearch, options: HalfChainOptions, rng: np.random.Generator
+) -> HalfChainEstimate:
+    """ln J by half chains, with every window's estimate.
+
+    Parameters
+    ----------
+    search : RingSearch
+        Minima of the molecule; tilted halves are centred on them, and plain ones take the
+        window's shape and its correction from them.
+    rng : numpy.random.Generator
+        Spawns one stream for each batch of halves.
+
+    Raises
+    ------
+    InputError
+        Fewer halves in a batch than two for each tilt.
+    SolveError
+        No stable ring, or no pair of halves met.
+    """
+    chain = search.chain
+    joint = chain.n_steps // 2
+    tilts = ring_tilts(search, joint)
+    per_batch = options.halves // options.batches
+    if options.tilted and per_batch < 2 * len(tilts):
+        raise InputError(
+            f"half chains of {chain.name}: {options.halves} halves are too few for {len(tilts)} "
+            f"tilts; draw {2 * len(tilts) * options.batches} or more"
+        )
+    streams = rng.spawn(2 * options.batches)
+    sides = [
+        _Sampler(chain, tilts, steps, options.tilted)
+        for steps in (slice(0, joint), slice(joint, chain.n_steps))
+    ]
+
+    def draw(index: int) -> _Halves:
+        return sides[index % 2].draw(per_batch, streams[index])
+
+    drawn: list[_Halves] = _map(draw, 2 * options.batches, options.threads)  # type: ignore
+    first, second = drawn[0::2], drawn[1::2]
+    reach = options.radius * max(
+        float(np.sqrt(np.linalg.eigvalsh(tilt.at_joint.spread[:3, :3])[-1])) for tilt in tilts
+    )
+    grid = _Grid(_Halves.joined(first), np.repeat(np.arange(options.batches), per_batch), reach)
+    return window_estimate(
+        chain,
+        _matched(grid, second, tilts, options),
+        sorted({tilt.link for tilt in tilts}),
+        len(tilts),
+        per_batch,
+        options.radius,
+        options.windows,
+    )
+
+
+def half_chain(
+    target: Chain | RingSearch,
+    options: HalfChainOptions | None = None,
+    rng: np.random.Generator | int = 0,
+) -> JFactor:
+    """J factor by half chains, plain or tilted.
+
+    Parameters
+    ----------
+    target : Chain or RingSearch
+        A molecule, or the minima already found for it.
+    rng : Generator or int
+        Random numbers, or the seed for them.
+
+    Returns
+    -------
+    JFactor
+        ``bias_bound`` is what extrapolating the window with a parabola changes.
+
+    Raises
+    ------
+    SolveError
+        No stable ring at any link searched, or no pair of halves met.
+    """
+    began = time.perf_counter()
+    options = options or HalfChainOptions()
+    search = find_rings(target) if isinstance(target, Chain) else target
+    estimate = half_chain_estimate(search, options, np.random.default_rng(rng))
+    chain = search.chain
+    if not math.isfinite(estimate.log_j):
+        raise SolveError(
+            f"half chains of {chain.name}: too few pairs to extrapolate the window; draw more "
+            "halves",
+            estimate,
+        )
+    warnings = list(chain.warnings)
+    tail = estimate.pareto_shape
+    heavy = estimate.largest_share > _LARGEST_SHARE or (
+        tail is not None and tail > HEAVY_PARETO_SHAPE
+    )
+    if heavy:
+        shape = "unknown" if tail is None else f"{tail:.2f}"
+        warnings.append(
+            f"one half carries {100.0 * estimate.largest_share:.0f} % of J, tail shape {shape}: "
+            f"{JStatus.HEAVY_TAILS.value}"
+        )
+    return JFactor(
+        target=chain.name,
+        n_bp=chain.n_steps,
+        method="half-chain" if options.tilted else "half-chain-plain",
+        minus_lnJ=-estimate.log_j,
+        stderr=estimate.stderr,
+        bias_bound=abs(estimate.bias),
+        links=estimate.links,
+        samples=2 * (options.halves // options.batches) * options.batches,
+        effective_samples=estimate.effective_halves,
+        pareto_shape=tail,
+        seconds=time.perf_counter() - began,
+        warnings=tuple(warnings),
+        status=JStatus.HEAVY_TAILS if heavy else JStatus.CONVERGED,
+    )

@@ -1,0 +1,1 @@
+"""Laplace's approximation: isolated, register-constrained, with its anharmonic term."""

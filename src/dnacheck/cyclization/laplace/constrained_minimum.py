@@ -1,0 +1,207 @@
+"""One closed ring held at one register, and the Gaussian of the shapes about it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dnacheck.cyclization.laplace.isolated import log_prefactor
+from dnacheck.cyclization.laplace.kernels import register as rk
+from dnacheck.cyclization.laplace.kernels.gaussian import ROWS
+from dnacheck.model.chain import Chain
+from dnacheck.numerics.outcome import InputError
+
+Array = NDArray[np.float64]
+
+_SUBDIVISIONS = 5
+_JUMP = 0.5
+"""Change of an angle (radians) between neighbours that means another branch was reached."""
+
+
+@dataclass(frozen=True)
+class RegisterOptions:
+    """How the register is covered.
+
+    Attributes
+    ----------
+    spacing : float
+        Distance of neighbouring registers in standard deviations of the register in the
+        narrowest minimum; a Gaussian is integrated to exp(-2 pi^2 / spacing^2).
+    fewest, most : int
+        Bounds on the number of registers on the circle; only those within ``depth`` are visited.
+    depth : float
+        Registers and links whose density lies below the largest by exp(-depth) are left out.
+    tolerance : float
+        Largest entry of the gradient of a held ring's Lagrangian, RT per radian.
+    max_iterations : int
+        Of Newton's method for one held ring.
+    rule_error : float
+        Relative error of the trapezoid rule above which the number of registers is doubled.
+    """
+
+    spacing: float = 0.9
+    fewest: int = 16
+    most: int = 65_536
+    depth: float = 12.0
+    tolerance: float = 1e-4
+    max_iterations: int = 30
+    rule_error: float = 1e-3
+
+    def __post_init__(self) -> None:
+        for name in ("spacing", "depth", "tolerance", "rule_error"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise InputError(f"register option {name} must be positive, not {value}")
+        if not 4 <= self.fewest <= self.most:
+            raise InputError(f"register counts need 4 <= {self.fewest} <= {self.most}")
+        if self.max_iterations < 1:
+            raise InputError(f"max_iterations must be at least 1, not {self.max_iterations}")
+
+
+@dataclass(frozen=True)
+class HeldRing:
+    """The lowest closed shape of one register and the Gaussian of its neighbours.
+
+    Energies in RT, lengths in steps. ``rows``, ``projector`` and ``fibre`` are flat, (7, 3N),
+    (7, 3N) and (6, 3N); ``right``, ``z`` and ``root`` are the factors of
+    :func:`dnacheck.cyclization.laplace.kernels.gaussian.factorise_slice`.
+
+    Attributes
+    ----------
+    position : int
+        Number of the register on the circle's grid.
+    register : float
+        In radians.
+    angles : ndarray, shape (N, 3)
+    multipliers : ndarray, shape (7,)
+        Force, moment and register multiplier.
+    energy : float
+    slope : float
+        Derivative of the energy with respect to the register.
+    extent : float
+        |S|.
+    log_density : float
+        ln of J(psi), mol/L per radian, by Laplace's approximation.
+    direction : ndarray, shape (N, 3)
+        Row whose product with the angles is |S| on this slice.
+    """
+
+    position: int
+    register: float
+    angles: Array
+    multipliers: Array
+    energy: float
+    slope: float
+    extent: float
+    log_density: float
+    direction: Array
+    rows: Array
+    right: Array
+    z: Array
+    root: Array
+    projector: Array
+    schur: Array
+    fibre: Array
+
+
+class Holder:
+    """Holds rings of one molecule and link; keeps what every call needs."""
+
+    def __init__(self, chain: Chain, link: int, options: RegisterOptions) -> None:
+        self.chain, self.link, self.options = chain, link, options
+        self.stiffness = np.ascontiguousarray(chain.energy_scale_RT * chain.stiffness)
+        self.flexibility = np.ascontiguousarray(np.linalg.inv(self.stiffness))
+        n = chain.n_steps
+        self.along, self.across = np.empty((n, 3)), np.empty((n, 3))
+        rk.register_functionals(chain.ground, chain.form_code, link, self.along, self.across)
+        scale = chain.energy_scale_RT
+        self.constant = (
+            log_prefactor(chain)
+            - 3.0 * math.log(scale / (2.0 * math.pi))
+            + 1.5 * n * math.log(scale)
+            - 3.5 * math.log(2.0 * math.pi)
+        )
+
+    def hold(
+        self, position: float, registers: int, angles: Array, multipliers: Array
+    ) -> HeldRing | None:
+        """Ring at ``position`` on a circle of so many registers, from a start close by."""
+        n = self.chain.n_steps
+        register = 2.0 * math.pi * position / registers
+        angles, multipliers = angles.copy(), multipliers.copy()
+        rows, projector = np.empty((ROWS, 3 * n)), np.empty((ROWS, 3 * n))
+        right, z, root = np.empty((n, 3, ROWS)), np.empty((n, 3, ROWS)), np.empty((n, 6))
+        schur, fibre = np.empty((ROWS, ROWS)), np.empty((6, 3 * n))
+        figures = np.zeros(rk.N_FIGURES)
+        code = rk.hold(
+            angles,
+            multipliers,
+            self.stiffness,
+            self.flexibility,
+            self.chain.ground,
+            self.chain.form_code,
+            self.along,
+            self.across,
+            register,
+            self.options.tolerance,
+            self.options.max_iterations,
+            rows,
+            right,
+            z,
+            root,
+            projector,
+            schur,
+            fibre,
+            figures,
+        )
+        extent = float(figures[rk.EXTENT])
+        if code != rk.HELD or not extent > 0.0:
+            return None
+        return HeldRing(
+            position=int(round(position)) % registers,
+            register=register,
+            angles=angles,
+            multipliers=multipliers,
+            energy=float(figures[rk.ENERGY]),
+            slope=float(figures[rk.SLOPE]),
+            extent=extent,
+            log_density=self.constant
+            - float(figures[rk.ENERGY])
+            - 0.5 * float(figures[rk.LOG_DET_KKT])
+            + math.log(extent),
+            direction=math.cos(register) * self.along + math.sin(register) * self.across,
+            rows=rows,
+            right=right,
+            z=z,
+            root=root,
+            projector=projector,
+            schur=schur,
+            fibre=fibre,
+        )
+
+    def advance(
+        self, ring: HeldRing, before: HeldRing | None, step: int, registers: int
+    ) -> HeldRing | None:
+        """The next ring of a branch, extrapolated from the last two and by ever smaller steps."""
+        here, last = ring, before
+        reached, gap, pieces = 0.0, 1.0, 1
+        for _ in range(2**_SUBDIVISIONS):
+            target = min(1.0, reached + 1.0 / pieces)
+            angles, multipliers = here.angles, here.multipliers
+            if last is not None:
+                ahead = (target - reached) / gap
+                angles = angles + ahead * (here.angles - last.angles)
+                multipliers = multipliers + ahead * (here.multipliers - last.multipliers)
+            found = self.hold(ring.position + step * target, registers, angles, multipliers)
+            if found is None or np.abs(found.angles - here.angles).max() > _JUMP:
+                pieces *= 2
+                if pieces > 2**_SUBDIVISIONS:
+                    return None
+                continue
+            if target >= 1.0:
+                return found
+            here, last, gap, reached = found, here, target - reached, target
+        return None

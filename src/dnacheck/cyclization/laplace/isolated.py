@@ -1,0 +1,150 @@
+"""Laplace's approximation of the J factor, from the log-determinant that a ring search leaves.
+
+With n = 3N angles, energies in RT and lengths in Å, one minimum contributes
+
+    J = 8 pi^2 exp(-E) sqrt(det(K / 2 pi)) (2 pi)^((n - 6)/2) / sqrt(|det KKT|),
+
+where |det KKT| = det(Z^T H Z) det(G G^T): H is the Hessian of the Lagrangian, G the 6 x n
+Jacobian of closure, Z an orthonormal basis of its null space. Steps as the unit of length and
+reduced energies leave the factor (s / 2 pi)^3 / l^3, with s RT per reduced unit and l the rise.
+Derived in docs/theory/jfactors.md.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dnacheck.cyclization.laplace.kernels.register import register_functionals, register_of
+from dnacheck.cyclization.result import (
+    PER_CUBIC_ANGSTROM_IN_MOLAR,
+    JFactor,
+    JStatus,
+    link_shares,
+)
+from dnacheck.equilibria.discrete.search import RingSearch, SearchOptions, find_rings
+from dnacheck.equilibria.discrete.solve import DiscreteRing
+from dnacheck.equilibria.discrete.spectrum import ProjectedInverse
+from dnacheck.model.chain import Chain
+from dnacheck.numerics.outcome import SolveError
+
+Array = NDArray[np.float64]
+
+SOFT_REGISTER = 0.75
+"""Standard deviation of the register (radians) above which Laplace's value is called unreliable:
+beyond it the Gaussian differs from the integral over the register by 0.1 to 0.5 in ln J."""
+
+
+def log_prefactor(chain: Chain) -> float:
+    """ln of 8 pi^2 sqrt(det K) (s / 2 pi)^3 / l^3 in mol/L, K reduced; see the module's text."""
+    scale = chain.energy_scale_RT / (2.0 * math.pi)
+    log_det_stiffness = float(np.linalg.slogdet(chain.stiffness)[1].sum())
+    return (
+        math.log(8.0 * math.pi**2)
+        + 0.5 * log_det_stiffness
+        + 3.0 * math.log(scale)
+        - 3.0 * math.log(chain.rise_A)
+        + math.log(PER_CUBIC_ANGSTROM_IN_MOLAR)
+    )
+
+
+def laplace_log_j(ring: DiscreteRing) -> float:
+    """ln J (mol/L) that Laplace's approximation gives one minimum."""
+    return log_prefactor(ring.chain) - ring.energy_RT - 0.5 * ring.log_abs_det_kkt
+
+
+def register_spread(chain: Chain, link: int, angles: Array, multipliers: Array) -> float:
+    """Standard deviation of the register of a ring in Laplace's Gaussian, in radians.
+
+    ``multipliers`` (6,) are reduced. Infinite for a zero mode, such as a straight molecule has.
+    """
+    n = chain.n_steps
+    along, across = np.empty((n, 3)), np.empty((n, 3))
+    register_functionals(chain.ground, chain.form_code, link, along, across)
+    register, extent = register_of(angles, along, across)
+    row = (math.cos(register) * across - math.sin(register) * along) / extent
+    inverse = ProjectedInverse(chain, angles, multipliers)
+    variance = float(np.sum(row * inverse(row))) / chain.energy_scale_RT
+    return math.sqrt(variance) if 0.0 < variance < math.inf else math.inf
+
+
+def require_rings(search: RingSearch) -> RingSearch:
+    """The search itself, if it found a ring that is not unstable.
+
+    Raises
+    ------
+    SolveError
+        No stable ring at any link searched.
+    """
+    if all(ring.stable is False for ring in search.equilibria):
+        raise SolveError(
+            f"J factor of {search.chain.name}: no stable ring at links "
+            f"{', '.join(map(str, search.links_searched))}; {JStatus.NOT_FOUND.value}",
+            search,
+        )
+    return search
+
+
+def laplace(target: Chain | RingSearch, options: SearchOptions | None = None) -> JFactor:
+    """J factor by Laplace's approximation, summed over the minima of all links.
+
+    Parameters
+    ----------
+    target : Chain or RingSearch
+        A molecule, or the minima already found for it.
+    options : SearchOptions, optional
+        Where minima are looked for, if they are not given.
+
+    Returns
+    -------
+    JFactor
+        ``stderr`` is 0 and ``bias_bound`` unknown: the error of Laplace's approximation (0.2 to
+        0.5 at 150 base pairs) is measured only by a method that samples, see
+        :mod:`dnacheck.cyclization.automatic`. A soft register is said in the status.
+
+    Raises
+    ------
+    SolveError
+        No stable ring at any link searched, or the lowest is one of a family of equal energy (a
+        straight molecule, whose register is free), for which Laplace's integral diverges.
+    """
+    began = time.perf_counter()
+    search = find_rings(target, options) if isinstance(target, Chain) else target
+    require_rings(search)
+    chain = search.chain
+    minima = [ring for ring in search.equilibria if ring.stable]
+    neutral = [ring.link for ring in search.equilibria if ring.stable is None]
+    if neutral:
+        raise SolveError(
+            f"J factor of {chain.name}: the register is free at link {neutral[0]}, where Laplace's "
+            "approximation diverges; use the register-integrated one or sample",
+            search,
+        )
+    parts: dict[int, float] = {}
+    for ring in minima:
+        value = laplace_log_j(ring)
+        parts[ring.link] = float(np.logaddexp(parts.get(ring.link, -math.inf), value))
+    total = float(np.logaddexp.reduce(list(parts.values())))
+    lowest = minima[0]
+    spread = register_spread(chain, lowest.link, lowest.angles, lowest.multipliers)
+    soft = not spread <= SOFT_REGISTER
+    warnings = list(chain.warnings)
+    if soft:
+        warnings.append(
+            f"the register of the lowest ring spreads by {spread:.2g} rad, more than "
+            f"{SOFT_REGISTER:g}: {JStatus.SOFT_REGISTER.value}"
+        )
+    return JFactor(
+        target=chain.name,
+        n_bp=chain.n_steps,
+        method="laplace",
+        minus_lnJ=-total,
+        stderr=0.0,
+        links=link_shares(parts),
+        seconds=time.perf_counter() - began,
+        warnings=tuple(warnings),
+        status=JStatus.SOFT_REGISTER if soft else JStatus.NO_ERROR_ESTIMATE,
+    )

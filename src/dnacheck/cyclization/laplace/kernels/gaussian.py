@@ -1,0 +1,352 @@
+"""Compiled Gaussian of the shapes near a closed ring, held at a register, in linear time.
+
+A slice holds seven linear functions of the angles at first order: the six of closure (rows b and a
+of :mod:`dnacheck.equilibria.discrete.kernels.closure`) and the register row v. Its rows are G (7,
+3N). The Hessian H of the Lagrangian is indefinite, but M = H + G^T R G is positive for a large
+enough positive 7 x 7 matrix R and agrees with H on the null space of G. Between angles j < k of
+different steps
+
+    M_jk = a_j . e_k + g_j . R g_k,   g = (b, a, v),
+
+again semi-separable, of rank seven, with left generators g and right generators R g + (0, e, 0).
+Its block L D L^T is the sweep of :mod:`dnacheck.equilibria.discrete.kernels.factorisation` with a 7
+x 7 matrix P. A draw x = L^-T D^-1/2 xi followed by the projection x - B G x, B = M^-1 G^T (G M^-1
+G^T)^-1, is distributed as N(0, Z (Z^T H Z)^-1 Z^T), Z an orthonormal basis of the null space of G:
+the Gaussian of Laplace's approximation, whatever R. Energies are in RT, lengths in steps.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from dnacheck.equilibria.discrete.kernels.factorisation import _coupling, _midstep_block
+from dnacheck.model.chain_kernels import WEDGE
+
+ROWS = 7
+"""Constraint rows of a slice: displacement (3), rotation (3), register (1)."""
+WIDTH = 8
+"""Columns handled together: the seven rows and one right-hand side."""
+
+
+@njit(cache=True, nogil=True)
+def invert_small(matrix: Any, out: Any) -> float:
+    """Inverse of a symmetric positive matrix (m, m) and the logarithm of its determinant.
+
+    Returns NaN if the matrix is not positive.
+    """
+    m = matrix.shape[0]
+    c = np.zeros((m, m))
+    log_det = 0.0
+    for i in range(m):
+        for j in range(i + 1):
+            total = matrix[i, j]
+            for k in range(j):
+                total -= c[i, k] * c[j, k]
+            if i == j:
+                if not total > 0.0:
+                    return math.nan
+                c[i, i] = math.sqrt(total)
+                log_det += math.log(total)
+            else:
+                c[i, j] = total / c[j, j]
+    inv = np.zeros((m, m))
+    for col in range(m):
+        for i in range(col, m):
+            total = 1.0 if i == col else 0.0
+            for k in range(col, i):
+                total -= c[i, k] * inv[k, col]
+            inv[i, col] = total / c[i, i]
+    for i in range(m):
+        for j in range(m):
+            total = 0.0
+            for k in range(max(i, j), m):
+                total += inv[k, i] * inv[k, j]
+            out[i, j] = total
+    return log_det
+
+
+@njit(cache=True, nogil=True)
+def constraint_rows(centres: Any, axes: Any, register: Any, rows: Any) -> None:
+    """Rows b, a and the register row (N, 3) of a slice; the last of the eight is not touched."""
+    n = axes.shape[0]
+    for s in range(n):
+        x = centres[n, 0] - centres[s + 1, 0]
+        y = centres[n, 1] - centres[s + 1, 1]
+        z = centres[n, 2] - centres[s + 1, 2]
+        for j in range(3):
+            a0, a1, a2 = axes[s, j, 0], axes[s, j, 1], axes[s, j, 2]
+            rows[s, j, 0] = a1 * z - a2 * y
+            rows[s, j, 1] = a2 * x - a0 * z
+            rows[s, j, 2] = a0 * y - a1 * x
+            rows[s, j, 3] = a0
+            rows[s, j, 4] = a1
+            rows[s, j, 5] = a2
+            rows[s, j, 6] = register[s, j]
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def stiff_columns(rows: Any, inverse_stiffness: Any, columns: Any) -> None:
+    """K^-1 times the columns (N, 3, 8)."""
+    for s in range(rows.shape[0]):
+        for k in range(3):
+            k0, k1, k2 = (
+                inverse_stiffness[s, k, 0],
+                inverse_stiffness[s, k, 1],
+                inverse_stiffness[s, k, 2],
+            )
+            for i in range(WIDTH):
+                columns[s, k, i] = k0 * rows[s, 0, i] + k1 * rows[s, 1, i] + k2 * rows[s, 2, i]
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def products(rows: Any, columns: Any, out: Any) -> None:
+    """out (7, 8) = products over the angles of the first seven rows with eight columns."""
+    for i in range(ROWS):
+        for j in range(WIDTH):
+            out[i, j] = 0.0
+    for s in range(rows.shape[0]):
+        for k in range(3):
+            for i in range(ROWS):
+                v = rows[s, k, i]
+                for j in range(WIDTH):
+                    out[i, j] += v * columns[s, k, j]
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def combine(columns: Any, matrix: Any, count: int, out: Any) -> None:
+    """out[i] = sum_j matrix[j, i] columns[:, :, j] for i < count, into flat rows (count, 3N)."""
+    n = columns.shape[0]
+    for s in range(n):
+        for k in range(3):
+            for i in range(count):
+                total = 0.0
+                for j in range(ROWS):
+                    total += matrix[j, i] * columns[s, k, j]
+                out[i, 3 * s + k] = total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def factorise_slice(
+    stiffness: Any,
+    form: int,
+    centres: Any,
+    axes: Any,
+    halves: Any,
+    multipliers: Any,
+    rows: Any,
+    penalty: Any,
+    right: Any,
+    z: Any,
+    root: Any,
+) -> float:
+    """Block factorisation of M; returns ln det M, NaN if M is not positive.
+
+    Parameters
+    ----------
+    stiffness : (N, 3, 3), RT. multipliers : (6,), RT per step and RT.
+    rows : (N, 3, 8) of :func:`constraint_rows`. penalty : R, (7, 7).
+    right : (N, 3, 7), filled with the right generators R g + (0, e, 0).
+    z : (N, 3, 7), filled with D^-1 (g - right P). root : (N, 6), filled with the inverse of the
+        lower Cholesky factor of D, packed as (00, 10, 11, 20, 21, 22).
+    """
+    n = rows.shape[0]
+    p = np.zeros((ROWS, ROWS))
+    e = np.empty((3, 3))
+    d = np.empty((3, 3))
+    ep = np.empty((3, ROWS))
+    u = np.empty((3, ROWS))
+    rg = np.empty((3, ROWS))
+    log_det = 0.0
+    for s in range(n):
+        x = centres[n, 0] - centres[s + 1, 0]
+        y = centres[n, 1] - centres[s + 1, 1]
+        zz = centres[n, 2] - centres[s + 1, 2]
+        for k in range(3):
+            _coupling(axes[s, k], x, y, zz, multipliers, e[k])
+            for i in range(ROWS):
+                total = 0.0
+                for j in range(ROWS):
+                    total += penalty[i, j] * rows[s, k, j]
+                rg[k, i] = total
+                right[s, k, i] = total
+            for i in range(3):
+                right[s, k, 3 + i] += e[k, i]
+            for i in range(ROWS):
+                total = 0.0
+                for j in range(ROWS):
+                    total += right[s, k, j] * p[j, i]
+                ep[k, i] = total
+                u[k, i] = rows[s, k, i] - total
+        if form != WEDGE:
+            _midstep_block(halves[s], x, y, zz, multipliers, d)
+        for k in range(3):
+            for j in range(k + 1):
+                if form == WEDGE:
+                    d[k, j] = (
+                        axes[s, j, 0] * e[k, 0] + axes[s, j, 1] * e[k, 1] + axes[s, j, 2] * e[k, 2]
+                    )
+                total = stiffness[s, k, j]
+                for i in range(ROWS):
+                    total += rows[s, j, i] * rg[k, i] - ep[k, i] * right[s, j, i]
+                d[k, j] += total
+        if not d[0, 0] > 0.0:
+            return math.nan
+        c00 = math.sqrt(d[0, 0])
+        c10 = d[1, 0] / c00
+        c20 = d[2, 0] / c00
+        t11 = d[1, 1] - c10 * c10
+        if not t11 > 0.0:
+            return math.nan
+        c11 = math.sqrt(t11)
+        c21 = (d[2, 1] - c20 * c10) / c11
+        t22 = d[2, 2] - c20 * c20 - c21 * c21
+        if not t22 > 0.0:
+            return math.nan
+        c22 = math.sqrt(t22)
+        log_det += math.log(d[0, 0]) + math.log(t11) + math.log(t22)
+        i00, i11, i22 = 1.0 / c00, 1.0 / c11, 1.0 / c22
+        i10 = -c10 * i00 * i11
+        i21 = -c21 * i11 * i22
+        i20 = -(c20 * i00 + c21 * i10) * i22
+        root[s, 0], root[s, 1], root[s, 2] = i00, i10, i11
+        root[s, 3], root[s, 4], root[s, 5] = i20, i21, i22
+        for i in range(ROWS):
+            w0 = i00 * u[0, i]
+            w1 = i10 * u[0, i] + i11 * u[1, i]
+            w2 = i20 * u[0, i] + i21 * u[1, i] + i22 * u[2, i]
+            z[s, 0, i] = i00 * w0 + i10 * w1 + i20 * w2
+            z[s, 1, i] = i11 * w1 + i21 * w2
+            z[s, 2, i] = i22 * w2
+        for i in range(ROWS):
+            for j in range(ROWS):
+                p[i, j] += u[0, i] * z[s, 0, j] + u[1, i] * z[s, 1, j] + u[2, i] * z[s, 2, j]
+    return log_det
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def solve_slice(right: Any, z: Any, root: Any, columns: Any) -> None:
+    """Solve M X = columns in place for eight columns (N, 3, 8), after :func:`factorise_slice`."""
+    n = right.shape[0]
+    f = np.zeros((ROWS, WIDTH))
+    for s in range(n):
+        c = columns[s]
+        for k in range(3):
+            for i in range(ROWS):
+                a = right[s, k, i]
+                for j in range(WIDTH):
+                    c[k, j] -= a * f[i, j]
+        for i in range(ROWS):
+            a0, a1, a2 = z[s, 0, i], z[s, 1, i], z[s, 2, i]
+            for j in range(WIDTH):
+                f[i, j] += a0 * c[0, j] + a1 * c[1, j] + a2 * c[2, j]
+    for i in range(ROWS):
+        for j in range(WIDTH):
+            f[i, j] = 0.0
+    for back in range(n):
+        s = n - 1 - back
+        c = columns[s]
+        r0, r1, r2, r3, r4, r5 = (
+            root[s, 0],
+            root[s, 1],
+            root[s, 2],
+            root[s, 3],
+            root[s, 4],
+            root[s, 5],
+        )
+        for j in range(WIDTH):
+            w0 = r0 * c[0, j]
+            w1 = r1 * c[0, j] + r2 * c[1, j]
+            w2 = r3 * c[0, j] + r4 * c[1, j] + r5 * c[2, j]
+            c[0, j] = r0 * w0 + r1 * w1 + r3 * w2
+            c[1, j] = r2 * w1 + r4 * w2
+            c[2, j] = r5 * w2
+        for k in range(3):
+            for i in range(ROWS):
+                a = z[s, k, i]
+                for j in range(WIDTH):
+                    c[k, j] -= a * f[i, j]
+        for i in range(ROWS):
+            a0, a1, a2 = right[s, 0, i], right[s, 1, i], right[s, 2, i]
+            for j in range(WIDTH):
+                f[i, j] += a0 * c[0, j] + a1 * c[1, j] + a2 * c[2, j]
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def draw_slice(right: Any, z: Any, root: Any, normals: Any, out: Any) -> None:
+    """x = L^-T D^-1/2 xi (N, 3) from standard normals xi (N, 3)."""
+    n = right.shape[0]
+    f0 = f1 = f2 = f3 = f4 = f5 = f6 = 0.0
+    for back in range(n):
+        s = n - 1 - back
+        n0, n1, n2 = normals[s, 0], normals[s, 1], normals[s, 2]
+        w0 = root[s, 0] * n0 + root[s, 1] * n1 + root[s, 3] * n2
+        w1 = root[s, 2] * n1 + root[s, 4] * n2
+        w2 = root[s, 5] * n2
+        v = z[s]
+        w0 -= v[0, 0] * f0 + v[0, 1] * f1 + v[0, 2] * f2 + v[0, 3] * f3
+        w0 -= v[0, 4] * f4 + v[0, 5] * f5 + v[0, 6] * f6
+        w1 -= v[1, 0] * f0 + v[1, 1] * f1 + v[1, 2] * f2 + v[1, 3] * f3
+        w1 -= v[1, 4] * f4 + v[1, 5] * f5 + v[1, 6] * f6
+        w2 -= v[2, 0] * f0 + v[2, 1] * f1 + v[2, 2] * f2 + v[2, 3] * f3
+        w2 -= v[2, 4] * f4 + v[2, 5] * f5 + v[2, 6] * f6
+        r = right[s]
+        f0 += r[0, 0] * w0 + r[1, 0] * w1 + r[2, 0] * w2
+        f1 += r[0, 1] * w0 + r[1, 1] * w1 + r[2, 1] * w2
+        f2 += r[0, 2] * w0 + r[1, 2] * w1 + r[2, 2] * w2
+        f3 += r[0, 3] * w0 + r[1, 3] * w1 + r[2, 3] * w2
+        f4 += r[0, 4] * w0 + r[1, 4] * w1 + r[2, 4] * w2
+        f5 += r[0, 5] * w0 + r[1, 5] * w1 + r[2, 5] * w2
+        f6 += r[0, 6] * w0 + r[1, 6] * w1 + r[2, 6] * w2
+        out[s, 0], out[s, 1], out[s, 2] = w0, w1, w2
+
+
+@njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
+def dot(a: Any, b: Any) -> float:
+    """Inner product of two vectors."""
+    total = 0.0
+    for k in range(a.shape[0]):
+        total += a[k] * b[k]
+    return total
+
+
+@njit(cache=True, nogil=True)
+def draw_closed(
+    rng: Any,
+    rows: Any,
+    right: Any,
+    z: Any,
+    root: Any,
+    projector: Any,
+    schur: Any,
+    normals: Any,
+    out: Any,
+) -> float:
+    """Draw x (N, 3) from the slice's Gaussian under closure to first order; x^T H x returns.
+
+    The arrays are as filled by :func:`dnacheck.cyclization.laplace.kernels.register.hold`;
+    ``normals`` (N, 3) is left with the standard normals that were drawn.
+    """
+    quadratic = 0.0
+    for s in range(normals.shape[0]):
+        for k in range(3):
+            value = rng.standard_normal()
+            normals[s, k] = value
+            quadratic += value * value
+    draw_slice(right, z, root, normals, out)
+    flat = out.reshape(out.size)
+    open_by = np.empty(ROWS)
+    for i in range(ROWS):
+        open_by[i] = dot(rows[i], flat)
+    for i in range(ROWS):
+        for j in range(ROWS):
+            quadratic -= open_by[i] * schur[i, j] * open_by[j]
+    for i in range(ROWS):
+        c = open_by[i]
+        b = projector[i]
+        for k in range(flat.shape[0]):
+            flat[k] -= c * b[k]
+    return quadratic

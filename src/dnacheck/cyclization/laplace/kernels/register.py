@@ -1,0 +1,241 @@
+"""Compiled equilibria of a ring held at a register.
+
+The register is the phase of S = sum_s exp(i alpha_s) (-theta_s + i phi_s), with alpha_s the twist
+that a uniformly overtwisted ring of the given link accumulates up to the bend of step s: the
+direction of the mean bending axis in a frame that does not turn about the ring. S is linear in
+the angles, so the shapes of one register form a half hyperplane, and the register's range is a
+circle: every shape has one register unless S = 0.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from dnacheck.cyclization.laplace.kernels.gaussian import (
+    ROWS,
+    WIDTH,
+    combine,
+    constraint_rows,
+    factorise_slice,
+    invert_small,
+    products,
+    solve_slice,
+    stiff_columns,
+)
+from dnacheck.equilibria.discrete.kernels.closure import (
+    closure_residual,
+    energy_gradient,
+    linearise,
+)
+from dnacheck.model.chain_kernels import WEDGE
+
+HELD = 0
+NOT_CONVERGED = 1
+NOT_FINITE = 2
+NOT_A_MINIMUM = 3
+
+# Positions of the figures of a held ring.
+ENERGY, LOG_DET_KKT, EXTENT, SLOPE, ITERATIONS = range(5)
+N_FIGURES = 5
+
+CLOSED = 1e-7
+"""Closure residual (steps, radians) of a held ring. Newton's last step leaves far less; and what
+is left changes no sampled J, whose draws close by themselves."""
+_TURN_CAP = 0.1
+"""Largest change of one angle in one iteration, in radians."""
+_FIRST_PENALTY = 4.0
+_PENALTY_RISES = 8
+
+
+@njit(cache=True, nogil=True)
+def register_functionals(ground: Any, form: int, link: int, along: Any, across: Any) -> None:
+    """Rows of Re S and Im S, each (N, 3), for a ring of ``link`` turns."""
+    n = ground.shape[0]
+    total = 0.0
+    for s in range(n):
+        total += ground[s, 0]
+    excess = (2.0 * math.pi * link - total) / n
+    phase = 0.0
+    for s in range(n):
+        twist = ground[s, 0] + excess
+        phase += twist if form == WEDGE else 0.5 * twist
+        c, sn = math.cos(phase), math.sin(phase)
+        along[s, 0] = across[s, 0] = 0.0
+        along[s, 1], along[s, 2] = -c, -sn
+        across[s, 1], across[s, 2] = -sn, c
+        if form != WEDGE:
+            phase += 0.5 * twist
+
+
+@njit(cache=True, nogil=True)
+def register_of(angles: Any, along: Any, across: Any) -> tuple[float, float]:
+    """Register in radians and |S| of a shape (N, 3)."""
+    x, y = 0.0, 0.0
+    for s in range(angles.shape[0]):
+        x += along[s, 1] * angles[s, 1] + along[s, 2] * angles[s, 2]
+        y += across[s, 1] * angles[s, 1] + across[s, 2] * angles[s, 2]
+    return math.atan2(y, x), math.hypot(x, y)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def hold(
+    angles: Any,
+    multipliers: Any,
+    stiffness: Any,
+    inverse_stiffness: Any,
+    ground: Any,
+    form: int,
+    along: Any,
+    across: Any,
+    register: float,
+    tolerance: float,
+    most: int,
+    flat_rows: Any,
+    right: Any,
+    z: Any,
+    root: Any,
+    projector: Any,
+    schur: Any,
+    fibre: Any,
+    figures: Any,
+) -> int:
+    """Minimum of the energy over closed shapes of one register, and the Gaussian about it.
+
+    Newton's iteration on the seven constraints from a start close by, in place; the Hessian is
+    that of the Lagrangian of closure, because the register row is linear.
+
+    Parameters
+    ----------
+    angles, multipliers : (N, 3), (7,); start and result. Energies in RT, lengths in steps.
+    stiffness, inverse_stiffness : (N, 3, 3), RT and its inverse. tolerance : largest entry of the
+    Lagrangian's gradient (RT per radian). flat_rows : (7, 3N), filled with the rows of G. right, z,
+    root : see :func:`dnacheck.cyclization.laplace.kernels.gaussian.factorise_slice`. projector :
+    (7, 3N), filled with B = M^-1 G^T (G M^-1 G^T)^-1. schur : (7, 7), filled with (G M^-1 G^T)^-1.
+    fibre : (6, 3N), filled with Y of :mod:`dnacheck.cyclization.closure.kernels.projection`; G Y =
+    1. figures : (5,), filled with energy, ln det KKT (RT, steps), |S|, d energy / d register and
+        iterations.
+
+    Returns
+    -------
+    code : HELD, NOT_CONVERGED, NOT_FINITE or NOT_A_MINIMUM.
+    """
+    n = angles.shape[0]
+    centres = np.empty((n + 1, 3))
+    frames = np.empty((n + 1, 3, 3))
+    axes = np.empty((n, 3, 3))
+    halves = np.empty((n if form != WEDGE else 0, 5, 3))
+    gradient = np.empty((n, 3))
+    row = np.empty((n, 3))
+    rows = np.zeros((n, 3, WIDTH))
+    columns = np.empty((n, 3, WIDTH))
+    solved = np.empty((n, 3, WIDTH))
+    closure = np.empty(ROWS)
+    gram = np.empty((ROWS, WIDTH))
+    weight = np.empty((ROWS, ROWS))
+    small = np.empty((ROWS, WIDTH))
+    new = np.empty(ROWS)
+    step = np.empty((n, 3))
+    c, sn = math.cos(register), math.sin(register)
+    for s in range(n):
+        for j in range(3):
+            row[s, j] = c * across[s, j] - sn * along[s, j]
+    for iteration in range(most + 1):
+        linearise(angles, form, centres, frames, axes, halves)
+        energy = energy_gradient(angles, ground, stiffness, gradient)
+        closure_residual(centres, frames, closure)
+        constraint_rows(centres, axes, row, rows)
+        closure[6] = 0.0
+        extent = 0.0
+        worst = 0.0
+        for s in range(n):
+            for j in range(3):
+                closure[6] += row[s, j] * angles[s, j]
+                extent += (c * along[s, j] + sn * across[s, j]) * angles[s, j]
+                total = gradient[s, j]
+                for i in range(ROWS):
+                    total += rows[s, j, i] * multipliers[i]
+                if not abs(total) <= worst:
+                    worst = abs(total)
+        open_by = 0.0
+        for i in range(ROWS):
+            if not abs(closure[i]) <= open_by:
+                open_by = abs(closure[i])
+        figures[ENERGY] = energy
+        figures[EXTENT] = extent
+        figures[SLOPE] = -multipliers[6] * extent
+        figures[ITERATIONS] = iteration
+        if not (math.isfinite(energy) and math.isfinite(worst) and math.isfinite(open_by)):
+            return NOT_FINITE
+        done = worst <= tolerance and open_by <= CLOSED
+        if not done and iteration == most:
+            return NOT_CONVERGED
+        stiff_columns(rows, inverse_stiffness, columns)
+        products(rows, columns, gram)
+        if math.isnan(invert_small(gram[:, :ROWS], weight)):
+            return NOT_FINITE
+        rise = _FIRST_PENALTY
+        log_det = math.nan
+        for _ in range(_PENALTY_RISES):
+            log_det = factorise_slice(
+                stiffness,
+                form,
+                centres,
+                axes,
+                halves,
+                multipliers,
+                rows,
+                rise * weight,
+                right,
+                z,
+                root,
+            )
+            if not math.isnan(log_det):
+                break
+            rise *= 4.0
+        if math.isnan(log_det):
+            return NOT_A_MINIMUM
+        for s in range(n):
+            for j in range(3):
+                for i in range(ROWS):
+                    solved[s, j, i] = rows[s, j, i]
+                solved[s, j, ROWS] = gradient[s, j]
+        solve_slice(right, z, root, solved)
+        products(rows, solved, small)
+        log_small = invert_small(small[:, :ROWS], schur)
+        if math.isnan(log_small):
+            return NOT_FINITE
+        if done:
+            figures[LOG_DET_KKT] = log_det + log_small
+            combine(solved, schur, ROWS, projector)
+            combine(columns, weight, 6, fibre)
+            for s in range(n):
+                for j in range(3):
+                    for i in range(ROWS):
+                        flat_rows[i, 3 * s + j] = rows[s, j, i]
+            return HELD
+        for i in range(ROWS):
+            new[i] = 0.0
+            for j in range(ROWS):
+                new[i] += schur[i, j] * (closure[j] - small[j, ROWS])
+        largest = 0.0
+        for s in range(n):
+            for k in range(3):
+                total = solved[s, k, ROWS]
+                for i in range(ROWS):
+                    total += solved[s, k, i] * new[i]
+                step[s, k] = -total
+                largest = max(largest, abs(total))
+        fraction = 1.0 if largest <= _TURN_CAP else _TURN_CAP / largest
+        for s in range(n):
+            for k in range(3):
+                angles[s, k] += fraction * step[s, k]
+        for i in range(ROWS):
+            # M holds the penalty, whose force on the step is not a multiplier.
+            for j in range(ROWS):
+                new[i] -= rise * weight[i, j] * closure[j]
+            multipliers[i] += fraction * (new[i] - multipliers[i])
+    return NOT_CONVERGED

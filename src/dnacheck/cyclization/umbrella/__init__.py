@@ -1,0 +1,1 @@
+"""Metropolis sampling under closure restraints of growing strength, joined by MBAR."""

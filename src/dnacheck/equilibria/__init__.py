@@ -1,0 +1,1 @@
+"""Closed equilibria: discrete chains, continuum rods, the way between them, and continuation."""

@@ -1,0 +1,1 @@
+"""From the continuum ring to base pairs and from the steps to the rod."""

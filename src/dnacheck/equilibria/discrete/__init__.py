@@ -1,0 +1,1 @@
+"""Closed equilibria of the chain of base-pair steps (Section IV A)."""

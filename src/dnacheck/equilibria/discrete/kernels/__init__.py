@@ -1,0 +1,1 @@
+"""Compiled loops of the discrete solver: arrays in, arrays and an integer code out."""

@@ -1,0 +1,108 @@
+"""Compiled solutions of the equations of one Newton step (KKT system) and what they tell."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from dnacheck.equilibria.discrete.kernels.factorisation import back_substitute, eliminate, factorise
+from dnacheck.equilibria.discrete.kernels.moves import accumulated_turn
+from dnacheck.numerics.small_systems import solve_small
+
+# First shift tried, relative to the energy of a bent circle.
+FIRST_SHIFT = 0.05
+MOST_SHIFTS = 40
+_INVERSE_ITERATIONS = 6
+
+
+@njit(cache=True, nogil=True)
+def solve_kkt(
+    state: Any,
+    stiffness: Any,
+    shift: float,
+    form: int,
+    multipliers: Any,
+    factors: Any,
+    small: Any,
+    slope: Any,
+    change: Any,
+) -> tuple[int, float, float]:
+    """Factorise the KKT matrix with a shift and solve for the ``change`` (6,) of the multipliers.
+
+    The right-hand side is ``slope`` (N, 3), the gradient of the Lagrangian. Solving for changes
+    keeps the error relative to them where a pivot of H happens to be tiny; the multipliers
+    themselves would carry it into every iteration.
+
+    Returns
+    -------
+    negatives : number of negative eigenvalues of the projected Hessian, -1 if it is singular.
+    log_det : log |det KKT|, minus infinity if it is singular.
+    weakest : see :func:`dnacheck.equilibria.discrete.kernels.factorisation.factorise`.
+    """
+    _, centres, _, axes, halves, _, closure = state
+    pivots, log_pivots, weakest = factorise(
+        slope, stiffness, shift, form, centres, axes, halves, multipliers, factors, small
+    )
+    rhs = np.empty(6)
+    for i in range(6):
+        rhs[i] = closure[i] - small[i, 6]
+    small_negatives, log_small = solve_small(small, rhs, float(axes.shape[0]), change)
+    # The inertia of the KKT matrix is that of H and of minus the Schur complement.
+    if small_negatives < 0:
+        return -1, -math.inf, weakest
+    return pivots - small_negatives, log_pivots + log_small, weakest
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def least_stable(axes: Any, factors: Any, small: Any, direction: Any) -> bool:
+    """Direction (N, 3) of least curvature, from the factors of a Hessian shifted to be positive.
+
+    ``axes`` are those of :func:`dnacheck.equilibria.discrete.kernels.closure.linearise`. A few
+    steps of inverse iteration, scaled so that no frame turns by more than a radian. False if that
+    fails.
+    """
+    n = axes.shape[0]
+    target = np.empty(6)
+    for s in range(n):
+        for j in range(3):
+            # Any vector serves that no symmetry of the chain makes orthogonal to the answer.
+            direction[s, j] = math.sin(1.0 + 3.7 * s + 1.3 * j * j)
+    turn = 1.0
+    for _ in range(_INVERSE_ITERATIONS):
+        eliminate(factors, direction, small)
+        if solve_small(small, -small[:, 6], float(n), target)[0] < 0:
+            return False
+        back_substitute(factors, target, 1.0, direction)
+        turn = accumulated_turn(axes, direction)
+        for s in range(n):
+            for j in range(3):
+                direction[s, j] /= turn
+    return math.isfinite(turn)
+
+
+@njit(cache=True, nogil=True)
+def positive_shift(
+    state: Any,
+    stiffness: Any,
+    start: float,
+    unit: float,
+    form: int,
+    multipliers: Any,
+    factors: Any,
+    small: Any,
+    slope: Any,
+    change: Any,
+) -> float:
+    """Smallest shift tried, from ``start`` on, that makes the projected Hessian positive; or -1."""
+    shift = start
+    for _ in range(MOST_SHIFTS):
+        negatives, _, _ = solve_kkt(
+            state, stiffness, shift, form, multipliers, factors, small, slope, change
+        )
+        if negatives == 0:
+            return shift
+        shift = max(FIRST_SHIFT * unit, 4.0 * shift)
+    return -1.0

@@ -1,0 +1,217 @@
+"""Compiled globalised Newton iteration for closed rings."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from dnacheck.equilibria.discrete.kernels.factorisation import FACTOR_WIDTH, back_substitute
+from dnacheck.equilibria.discrete.kernels.kkt import (
+    FIRST_SHIFT,
+    MOST_SHIFTS,
+    least_stable,
+    positive_shift,
+    solve_kkt,
+)
+from dnacheck.equilibria.discrete.kernels.moves import (
+    accumulated_turn,
+    evaluate,
+    line_search,
+    move,
+    new_state,
+    residuals,
+)
+
+CONVERGED = 0
+ITERATION_LIMIT = 1
+STEP_LIMIT = 2
+NOT_FINITE = 3
+SINGULAR = 4
+
+# Positions of the figures that a solve returns.
+ENERGY, RESIDUAL, CLOSURE, NEGATIVES, LOG_DET_KKT, ITERATIONS, WEAKEST_PIVOT, NEUTRAL = range(8)
+N_FIGURES = 8
+
+# Below this curvature along a rotation of the frames, relative to that of the energy of a bent
+# circle, a mode costs nothing that round-off could tell from zero.
+_FLAT = 1e-7
+# Smallest shift, and what it grows from is at most so many times the residual: near a soft register
+# a larger one would make the iteration linear.
+_LEAST_SHIFT = 1e-10
+_SHIFT_OF_RESIDUAL = 10.0
+_MOST_ESCAPES = 4
+_ESCAPE_TURN = 0.3
+
+
+@njit(cache=True, nogil=True)
+def _inspect(
+    state: Any,
+    stiffness: Any,
+    flat: float,
+    form: int,
+    multipliers: Any,
+    factors: Any,
+    small: Any,
+    slope: Any,
+    change: Any,
+    figures: Any,
+) -> int:
+    """Inertia and determinant at an equilibrium, into ``figures``.
+
+    Returns the number of eigenvalues below -flat, or -1 if even a shift by ``flat`` is singular.
+    """
+    below, _, _ = solve_kkt(
+        state, stiffness, -flat, form, multipliers, factors, small, slope, change
+    )
+    negatives, log_det, weakest = solve_kkt(
+        state, stiffness, 0.0, form, multipliers, factors, small, slope, change
+    )
+    above = negatives
+    if negatives != 0:
+        above, _, _ = solve_kkt(
+            state, stiffness, flat, form, multipliers, factors, small, slope, change
+        )
+    figures[NEGATIVES] = above
+    figures[NEUTRAL] = below - above
+    figures[LOG_DET_KKT] = log_det
+    figures[WEAKEST_PIVOT] = weakest
+    return above
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def newton(
+    angles: Any,
+    multipliers: Any,
+    ground: Any,
+    stiffness: Any,
+    form: int,
+    tolerance: float,
+    max_iterations: int,
+    turn_cap: float,
+    minima_only: bool,
+    figures: Any,
+) -> int:
+    """Move ``angles`` (N, 3) and ``multipliers`` (6,) to a closed equilibrium, in place.
+
+    Each iteration factorises the Hessian of the Lagrangian. A shift that penalises the rotation
+    of frames (see :func:`factorise`) is raised until the projected Hessian is positive (only with
+    ``minima_only``) and no frame turns by much more than ``turn_cap`` radians. Steps that
+    :func:`line_search` shortens much raise it too; steps that do what the model predicts lower
+    it. Multipliers that are all zero are estimated first. A saddle, with ``minima_only``, is left
+    along its direction of least curvature.
+
+    ``figures`` (8,) receives energy, residual, closure residual, the number of negative
+    eigenvalues of the projected Hessian (round-off apart), log |det KKT|, iterations, the weakest
+    pivot and the number of eigenvalues that are zero to round-off. Every exit has a code; no loop
+    is unbounded.
+    """
+    n = angles.shape[0]
+    state = new_state(n, form)
+    trial = new_state(n, form)
+    factors = np.empty((n, FACTOR_WIDTH))
+    small = np.empty((6, 7))
+    step = np.empty((n, 3))
+    slope = np.empty((n, 3))
+    change = np.empty(6)
+    target = np.empty(6)
+    mean_bend = 0.0
+    for s in range(n):
+        mean_bend += 0.5 * (stiffness[s, 1, 1] + stiffness[s, 2, 2]) / n
+    # Energy of a bent circle over its length: the scale on which rolling costs energy.
+    unit = 2.0 * math.pi * math.pi * mean_bend / n
+    flat = _FLAT * unit
+    shift, first = 0.0, 0.0
+    escapes = 0
+
+    state[0][:] = angles
+    energy = evaluate(state, ground, stiffness, form)
+    unknown = True
+    for i in range(6):
+        unknown = unknown and multipliers[i] == 0.0
+    if unknown:
+        residuals(state, multipliers, slope)
+        negatives, _, _ = solve_kkt(
+            state, stiffness, 0.0, form, multipliers, factors, small, slope, change
+        )
+        if negatives >= 0:
+            multipliers[:] = change
+    code = ITERATION_LIMIT
+    for iteration in range(max_iterations + 1):
+        stationarity, worst = residuals(state, multipliers, slope)
+        figures[ENERGY] = energy
+        figures[RESIDUAL] = max(stationarity, worst)
+        figures[CLOSURE] = worst
+        figures[ITERATIONS] = iteration
+        if not (math.isfinite(energy) and math.isfinite(stationarity) and math.isfinite(worst)):
+            code = NOT_FINITE
+            break
+        if figures[RESIDUAL] <= tolerance:
+            unstable = _inspect(
+                state, stiffness, flat, form, multipliers, factors, small, slope, change, figures
+            )
+            code = CONVERGED if unstable >= 0 else SINGULAR
+            if unstable <= 0 or not minima_only or escapes == _MOST_ESCAPES:
+                break
+            code = ITERATION_LIMIT
+            escapes += 1
+            shift = positive_shift(
+                state, stiffness, flat, unit, form, multipliers, factors, small, slope, change
+            )
+            if shift < 0.0 or not least_stable(state[3], factors, small, step):
+                code = CONVERGED
+                break
+            move(state, step, _ESCAPE_TURN, 1.0, form, trial[0])
+            energy = evaluate(trial, ground, stiffness, form)
+            state, trial = trial, state
+            continue
+        if iteration == max_iterations:
+            break
+
+        shift = max(shift if shift > 1e-3 * first else 0.0, _LEAST_SHIFT * unit)
+        first = min(FIRST_SHIFT * unit, _SHIFT_OF_RESIDUAL * stationarity)
+        turn = math.inf
+        for attempt in range(MOST_SHIFTS):
+            negatives, _, _ = solve_kkt(
+                state, stiffness, shift, form, multipliers, factors, small, slope, change
+            )
+            if negatives == 0 or (negatives > 0 and not minima_only):
+                back_substitute(factors, change, 1.0, step)
+                turn = accumulated_turn(state[3], step)
+                if turn <= 2.0 * turn_cap or not minima_only or attempt >= 6:
+                    break
+                shift = 2.0 * (shift + first)
+            else:
+                shift = max(first, 4.0 * shift)
+        if not math.isfinite(turn):
+            code = SINGULAR
+            break
+        for i in range(6):
+            target[i] = multipliers[i] + change[i]
+        fraction, energy, ratio = line_search(
+            state,
+            trial,
+            step,
+            turn,
+            turn_cap,
+            energy,
+            figures[RESIDUAL],
+            target,
+            ground,
+            stiffness,
+            form,
+        )
+        if fraction == 0.0:
+            code = STEP_LIMIT
+            break
+        if fraction < 0.3 and turn <= 2.0 * turn_cap:
+            shift = max(first, 4.0 * shift)
+        elif ratio > 0.8:
+            shift *= 0.25
+        for i in range(6):
+            multipliers[i] += fraction * change[i]
+        state, trial = trial, state
+    angles[:] = state[0]
+    return code

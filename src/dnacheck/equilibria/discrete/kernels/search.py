@@ -1,0 +1,158 @@
+"""Compiled search for the minima of a ring over links and registers."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from dnacheck.equilibria.discrete.kernels.newton import (
+    CONVERGED,
+    ENERGY,
+    N_FIGURES,
+    NEGATIVES,
+    NEUTRAL,
+    newton,
+)
+from dnacheck.equilibria.discrete.kernels.starts import circle_registers, fill_circle
+
+# Two minima are one when their energies agree to this relative precision and their angles to
+# the second figure, in radians; converged solutions agree far better.
+_SAME_ENERGY = 1e-7
+_SAME_ANGLES = 1e-4
+
+
+@njit(cache=True, nogil=True)
+def best_register(ground: Any, stiffness: Any, form: int, link: int, scratch: Any) -> float:
+    """Register of lowest predicted energy of the planar ring; see :func:`circle_registers`."""
+    circle_registers(ground, stiffness, form, link, scratch[0])
+    return scratch[0, 0]
+
+
+@njit(cache=True, nogil=True)
+def _known(trial: Any, energy: float, neutral: bool, found: int, angles: Any, figures: Any) -> bool:
+    """Whether a ring is among those found; of a family of equal energy one stands for all."""
+    for m in range(found):
+        gap = abs(figures[m, ENERGY] - energy)
+        if gap > _SAME_ENERGY * abs(energy) + 1e-14:
+            continue
+        if neutral and figures[m, NEUTRAL] > 0.0:
+            return True
+        worst = 0.0
+        for s in range(trial.shape[0]):
+            for j in range(3):
+                worst = max(worst, abs(trial[s, j] - angles[m, s, j]))
+        if worst < _SAME_ANGLES:
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True)
+def minimum_from_circle(
+    ground: Any,
+    stiffness: Any,
+    form: int,
+    link: int,
+    register: float,
+    tolerance: float,
+    max_iterations: int,
+    turn_cap: float,
+    angles: Any,
+    multipliers: Any,
+    figures: Any,
+) -> bool:
+    """Whether the planar ring of a link and register leads to a minimum.
+
+    It fills ``angles`` (N, 3), ``multipliers`` (6,) and ``figures`` (8,); see :func:`newton`.
+    """
+    fill_circle(ground, form, link, register, angles)
+    multipliers[:] = 0.0
+    figures[:] = 0.0
+    code = newton(
+        angles,
+        multipliers,
+        ground,
+        stiffness,
+        form,
+        tolerance,
+        max_iterations,
+        turn_cap,
+        True,
+        figures,
+    )
+    return code == CONVERGED and figures[NEGATIVES] == 0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def search(
+    ground: Any,
+    stiffness: Any,
+    form: int,
+    links: Any,
+    registers: Any,
+    window: float,
+    tolerance: float,
+    max_iterations: int,
+    turn_cap: float,
+    angles: Any,
+    multipliers: Any,
+    figures: Any,
+) -> tuple[int, int, int]:
+    """Distinct minima reached from planar rings of the given links.
+
+    Each link starts from the one or two registers where its planar ring is predicted to rest;
+    links whose minimum lies within ``window`` (reduced energy) of the lowest start again from the
+    best one plus each of ``registers``. The minima fill ``angles`` (M, N, 3), ``multipliers``
+    (M, 6) and ``figures`` (M, 8) in order of discovery.
+
+    Returns
+    -------
+    found, starts, failed : how many distinct minima, starts, and starts that did not converge.
+    """
+    n = ground.shape[0]
+    found, starts, failed = 0, 0, 0
+    trial = np.empty((n, 3))
+    force = np.empty(6)
+    figure = np.empty(N_FIGURES)
+    rests = np.empty((links.shape[0], 2))
+    counts = np.empty(links.shape[0], dtype=np.int64)
+    energies = np.full(links.shape[0], math.inf)
+    lowest = math.inf
+    for round_ in range(2 + registers.shape[0]):
+        for i in range(links.shape[0]):
+            if round_ == 0:
+                counts[i] = circle_registers(ground, stiffness, form, links[i], rests[i])
+            if round_ >= 2 and not energies[i] <= lowest + window:
+                continue
+            if round_ == 1 and counts[i] < 2:
+                continue
+            register = rests[i, round_] if round_ < 2 else rests[i, 0] + registers[round_ - 2]
+            starts += 1
+            if not minimum_from_circle(
+                ground,
+                stiffness,
+                form,
+                links[i],
+                register,
+                tolerance,
+                max_iterations,
+                turn_cap,
+                trial,
+                force,
+                figure,
+            ):
+                failed += 1
+                continue
+            neutral = figure[NEUTRAL] > 0.0
+            energies[i] = min(energies[i], figure[ENERGY])
+            lowest = min(lowest, figure[ENERGY])
+            if found < angles.shape[0] and not _known(
+                trial, figure[ENERGY], neutral, found, angles, figures
+            ):
+                angles[found] = trial
+                multipliers[found] = force
+                figures[found] = figure
+                found += 1
+    return found, starts, failed

@@ -1,0 +1,175 @@
+"""Compiled starting shapes: planar rings of given link and register, and which register is best."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from dnacheck.equilibria.discrete.kernels.closure import linearise
+from dnacheck.equilibria.discrete.kernels.factorisation import (
+    FACTOR_WIDTH,
+    back_substitute,
+    eliminate,
+)
+from dnacheck.equilibria.discrete.kernels.kkt import positive_shift
+from dnacheck.equilibria.discrete.kernels.moves import new_state
+from dnacheck.model.chain_kernels import fill_angles
+from dnacheck.numerics.small_systems import solve_small
+
+# Registers at which the predicted energy is sampled; it holds two harmonics.
+_SAMPLES = 32
+# Penalty on rotations of the frames while the ring relaxes, relative to a circle's energy; it
+# holds the register, which costs nothing to a straight molecule.
+_HELD = 0.02
+
+
+@njit(cache=True, nogil=True)
+def fill_circle(ground: Any, form: int, link: int, register: float, angles: Any) -> None:
+    """Angles (N, 3) of a closed planar ring with the given link.
+
+    The centres lie on a regular N-gon. d1 turns about the edges by the ground twists plus an
+    equal share of the excess that ``link`` turns ask for; at the first base pair it stands at
+    ``register`` radians from the normal that points to the middle of the ring.
+    """
+    n = ground.shape[0]
+    frames = np.empty((n + 1, 3, 3))
+    total = 0.0
+    for s in range(n):
+        total += ground[s, 0]
+    excess = (2.0 * math.pi * link - total) / n
+    phase = register
+    for s in range(n + 1):
+        around = 2.0 * math.pi * s / n
+        tx, ty = math.cos(around), math.sin(around)
+        c, sn = math.cos(phase), math.sin(phase)
+        # inward normal (-ty, tx, 0); tangent x normal = (0, 0, 1).
+        frames[s, 0, 0], frames[s, 1, 0], frames[s, 2, 0] = -c * ty, c * tx, sn
+        frames[s, 0, 1], frames[s, 1, 1], frames[s, 2, 1] = sn * ty, -sn * tx, c
+        frames[s, 0, 2], frames[s, 1, 2], frames[s, 2, 2] = tx, ty, 0.0
+        if s < n:
+            phase += ground[s, 0] + excess
+    fill_angles(frames, form, angles)
+
+
+@njit(cache=True, nogil=True)
+def circle_registers(ground: Any, stiffness: Any, form: int, link: int, registers: Any) -> int:
+    """Registers at which a planar ring of a link is predicted to rest, lowest first.
+
+    Rolling the molecule by a register psi inside a planar ring costs v^T Q v with
+    v = (1, cos psi, sin psi): exactly, the energy of the planar ring, less what it gains when it
+    relaxes, to second order in the ground bends and for their mean stiffness. Such a function has
+    one minimum or two.
+
+    Parameters
+    ----------
+    registers : (2,), filled with the minima, in radians.
+
+    Returns
+    -------
+    count : number of minima, 1 or 2.
+    """
+    q = np.empty((3, 3))
+    _roll_energy(ground, stiffness, form, link, q)
+    energies = np.empty(_SAMPLES)
+    top, bottom = -math.inf, math.inf
+    for k in range(_SAMPLES):
+        psi = 2.0 * math.pi * k / _SAMPLES
+        c, s = math.cos(psi), math.sin(psi)
+        first = c * (q[0, 1] + q[1, 0]) + s * (q[0, 2] + q[2, 0])
+        second = c * c * q[1, 1] + c * s * (q[1, 2] + q[2, 1]) + s * s * q[2, 2]
+        energies[k] = q[0, 0] + first + second
+        top, bottom = max(top, energies[k]), min(bottom, energies[k])
+    count = 0
+    depths = np.empty(2)
+    flat = not top - bottom > 1e-9 * (abs(top) + abs(bottom))
+    for k in range(_SAMPLES):
+        e0, e1, e2 = energies[k - 1], energies[k], energies[(k + 1) % _SAMPLES]
+        if count < 2 and e0 > e1 and e1 <= e2 and not flat:
+            offset = 0.5 * (e0 - e2) / (e0 - 2.0 * e1 + e2)
+            registers[count] = 2.0 * math.pi * (k + offset) / _SAMPLES
+            depths[count] = e1
+            count += 1
+    if count == 0:
+        registers[0] = 0.0
+        count = 1
+    elif count == 2 and depths[1] < depths[0]:
+        registers[0], registers[1] = registers[1], registers[0]
+    return count
+
+
+@njit(cache=True, nogil=True)
+def _roll_energy(ground: Any, stiffness: Any, form: int, link: int, quadratic: Any) -> None:
+    """Energy of a planar ring as a quadratic form (3, 3) in (1, cos psi, sin psi).
+
+    Seen from the ring, rolling turns the ground bends and leaves everything else. The relaxation
+    leaves out the roll itself, which costs nothing to the straight molecule it starts from.
+    """
+    n = ground.shape[0]
+    state = new_state(n, form)
+    angles, centres, frames, axes, _, gradient, closure = state
+    fill_circle(ground, form, link, 0.0, angles)
+    linearise(angles, form, centres, frames, axes, state[4])
+    gradient[:] = 0.0
+    closure[:] = 0.0
+    quadratic[:] = 0.0
+    pulls = np.zeros((2, n, 3))
+    mean = np.zeros((n, 3, 3))
+    old = np.zeros((3, 3))
+    strain = np.zeros((3, 3))
+    roll, torque, bending = 0.0, 0.0, 0.0
+    for s in range(n):
+        theta, phi = angles[s, 1], angles[s, 2]
+        excess = angles[s, 0] - ground[s, 0]
+        strain[0, 0], strain[0, 1], strain[0, 2] = excess, -ground[s, 1], -ground[s, 2]
+        strain[1, 1], strain[1, 2] = theta, phi
+        strain[2, 1], strain[2, 2] = -phi, theta
+        for j in range(3):
+            for k in range(3):
+                old[j, k] = 0.5 * (
+                    stiffness[s, k, 0] * strain[j, 0]
+                    + stiffness[s, k, 1] * strain[j, 1]
+                    + stiffness[s, k, 2] * strain[j, 2]
+                )
+            for i in range(3):
+                quadratic[i, j] += (
+                    strain[i, 0] * old[j, 0] + strain[i, 1] * old[j, 1] + strain[i, 2] * old[j, 2]
+                )
+        bend = 0.5 * (stiffness[s, 1, 1] + stiffness[s, 2, 2])
+        mean[s, 0, 0], mean[s, 1, 1], mean[s, 2, 2] = stiffness[s, 0, 0], bend, bend
+        pulls[0, s, 1], pulls[0, s, 2] = -bend * ground[s, 1], -bend * ground[s, 2]
+        pulls[1, s, 1], pulls[1, s, 2] = bend * ground[s, 2], -bend * ground[s, 1]
+        roll += theta * theta + phi * phi
+        torque += stiffness[s, 0, 0] * excess / n
+        bending += bend * 2.0 * math.pi / (n * n)
+    # Multipliers that hold a straight, twisted rod in a circle, in the frame of base pair 0, whose
+    # d1 points to the middle of the ring.
+    force = 2.0 * math.sin(math.pi / n) * torque
+    circle = np.array([0.0, -force, 0.0, 0.5 * force, -bending, -torque])
+    unit = math.pi * bending
+    factors = np.empty((n, FACTOR_WIDTH))
+    small = np.empty((6, 7))
+    target = np.empty(6)
+    step = np.empty((n, 3))
+    held = positive_shift(
+        state, mean, _HELD * unit, unit, form, circle, factors, small, gradient, target
+    )
+    if held < 0.0:
+        return
+    for i in range(2):
+        along = 0.0
+        for s in range(n):
+            along += pulls[i, s, 2] * angles[s, 1] - pulls[i, s, 1] * angles[s, 2]
+        for s in range(n):
+            pulls[i, s, 1] += along / roll * angles[s, 2]
+            pulls[i, s, 2] -= along / roll * angles[s, 1]
+    for i in range(2):
+        eliminate(factors, pulls[i], small)
+        solve_small(small, -small[:, 6], float(n), target)
+        back_substitute(factors, target, 1.0, step)
+        for j in range(2):
+            for s in range(n):
+                gain = pulls[j, s, 0] * step[s, 0] + pulls[j, s, 1] * step[s, 1]
+                quadratic[1 + i, 1 + j] += 0.5 * (gain + pulls[j, s, 2] * step[s, 2])

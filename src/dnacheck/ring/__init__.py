@@ -1,1 +1,0 @@
-"""Closed rings: discrete equilibria, continuum equilibria, and the way between them."""

@@ -1,0 +1,1 @@
+"""Rings and J factors of many sequences."""

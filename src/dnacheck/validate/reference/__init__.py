@@ -1,0 +1,1 @@
+"""What is compared with: published tables, exact limits, independent programs."""

@@ -1,0 +1,1 @@
+"""Scenes: which molecules, which model, which quantities, how accurate."""
