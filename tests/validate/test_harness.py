@@ -13,7 +13,8 @@ import pytest
 from dnacheck.cli import main
 from dnacheck.model.data_files import data_directory
 from dnacheck.numerics.outcome import InputError
-from dnacheck.validate import harness, worker
+from dnacheck.validate.engine import run as harness
+from dnacheck.validate.engine import worker
 from dnacheck.validate.engine.baseline import compare, read_baseline
 from dnacheck.validate.engine.context import Context, seed_of
 from dnacheck.validate.engine.plan import Plan, Step, make_plan
@@ -26,11 +27,10 @@ from dnacheck.validate.engine.state import (
     run_key,
 )
 from dnacheck.validate.engine.verdict import Rule, Verdict, judge, must_fail
-from dnacheck.validate.report import RunRecord
 from dnacheck.validate.report.html import report_html
 from dnacheck.validate.report.record import Column, Figure, Note, Rings, Table
 from dnacheck.validate.report.tables import table_csv
-from dnacheck.validate.report.write import report_json
+from dnacheck.validate.report.write import RunRecord, report_json
 from dnacheck.validate.scene.file import load_scene
 
 NASTY = "<script>alert('x')</script>"

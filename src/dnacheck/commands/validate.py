@@ -13,7 +13,7 @@ from dnacheck.commands.output import note, print_json, progress
 if TYPE_CHECKING:
     from dnacheck.validate.engine.plan import Plan
     from dnacheck.validate.engine.registry import Check, Findings
-    from dnacheck.validate.report import RunRecord
+    from dnacheck.validate.report.write import RunRecord
 
 EXIT_CHECK_FAILED = 1
 

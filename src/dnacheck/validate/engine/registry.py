@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 GROUP_MODULES = (
     "table2",
-    "wanted",
+    "requested",
     "discrete",
     "continuum",
     "sweeps",

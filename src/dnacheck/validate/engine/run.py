@@ -16,7 +16,7 @@ from dnacheck.validate.engine.runner import run_checks
 from dnacheck.validate.engine.state import StateFolder, run_key
 from dnacheck.validate.engine.verdict import skipped
 from dnacheck.validate.engine.worker import Job
-from dnacheck.validate.report import RunRecord, write_report
+from dnacheck.validate.report.write import RunRecord, write_report
 from dnacheck.validate.scene.scene import Scene
 
 STATE_FOLDER = ".state"

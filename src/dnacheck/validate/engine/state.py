@@ -34,7 +34,7 @@ def file_digests() -> dict[str, str]:
 @cache
 def code_digest() -> str:
     """SHA-256 of the package's source files."""
-    root = Path(__file__).resolve().parents[1]
+    root = Path(__file__).resolve().parents[2]
     digest = hashlib.sha256()
     for path in sorted(root.rglob("*.py")):
         digest.update(path.relative_to(root).as_posix().encode())

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from types import ModuleType
 
-FOLDER = Path(__file__).resolve().parents[3] / "validation" / "oracles"
+FOLDER = Path(__file__).resolve().parents[4] / "validation" / "oracles"
 
 
 def oracle_exists(name: str) -> bool:

@@ -153,7 +153,7 @@ class Scene(_Part):
 
 def scenes_directory() -> Path:
     """Folder of the scenes that ship: inside the installed package, else in the checkout."""
-    package = Path(__file__).resolve().parents[1]
+    package = Path(__file__).resolve().parents[2]
     installed = package / "scenes"
     return installed if installed.is_dir() else package.parents[1] / "validation" / "scenes"
 
