@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dnacheck.model.a_tracts import Region, automatic_regions, parse_regions, tract_regions
-from dnacheck.model.chain_kernels import MIDSTEP, WEDGE, fill_angles, fill_frames
+from dnacheck.model.chain_kernels import MIDSTEP, WEDGE, HingeSteps, fill_angles, fill_frames
 from dnacheck.model.molecules import Molecule
 from dnacheck.model.parameters import AngleSet, load_angle_set
 from dnacheck.model.sequence import Sequence
@@ -94,6 +95,15 @@ class Chain:
     def form_code(self) -> int:
         """Integer of the step form, for compiled kernels."""
         return WEDGE if self.step_form == "wedge" else MIDSTEP
+
+    @cached_property
+    def arrays(self) -> HingeSteps:
+        """What compiled kernels read of the steps: copies of the arrays, made once.
+
+        They are writable only because a kernel is compiled anew for read-only arrays; nothing
+        writes to them.
+        """
+        return HingeSteps(self.ground.copy(), self.stiffness.copy(), self.form_code)
 
     @property
     def relaxed_turns(self) -> float:

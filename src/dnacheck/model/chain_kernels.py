@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -13,6 +13,25 @@ from dnacheck.numerics.trigonometry import arctangents
 
 WEDGE = 0
 MIDSTEP = 1
+
+
+class HingeSteps(NamedTuple):
+    """Elastic steps of three angles about a pivot, as compiled kernels read them.
+
+    Attributes
+    ----------
+    ground : ndarray, shape (N, 3)
+        Unstressed tau, theta, phi in radians.
+    stiffness : ndarray, shape (N, 3, 3)
+        Symmetric, reduced.
+    form : int
+        ``WEDGE`` or ``MIDSTEP``.
+    """
+
+    ground: Any
+    stiffness: Any
+    form: int
+
 
 # Products of rotations drift from orthonormality by about one rounding error a step; one
 # correction every so many steps keeps the drift at that of a single step.

@@ -9,10 +9,16 @@ import numpy as np
 from numba import njit
 
 from dnacheck.equilibria.discrete.kernels.closure import energy_gradient
-from dnacheck.equilibria.discrete.kernels.newton import ENERGY, LOG_DET_KKT, N_FIGURES, NEUTRAL
+from dnacheck.equilibria.discrete.kernels.newton import (
+    ENERGY,
+    LOG_DET_KKT,
+    N_FIGURES,
+    NEUTRAL,
+    NewtonLimits,
+)
 from dnacheck.equilibria.discrete.kernels.search import minimum_from_circle
 from dnacheck.equilibria.discrete.kernels.starts import circle_registers, fill_circle
-from dnacheck.model.chain_kernels import fill_frames
+from dnacheck.model.chain_kernels import HingeSteps, fill_frames
 from dnacheck.numerics.curve_topology import link_of_ring
 
 # Positions of the figures of a scanned molecule.
@@ -49,6 +55,8 @@ def scan_molecule(
     found : whether there is a stable ring.
     """
     n = ground.shape[0]
+    steps = HingeSteps(ground, stiffness, form)
+    limits = NewtonLimits(_TOLERANCE, _MOST_ITERATIONS, _TURN_CAP, True)
     count = links.shape[0]
     trial = np.empty((n, 3))
     gradient = np.empty((n, 3))
@@ -84,19 +92,7 @@ def scan_molecule(
             register = (
                 rests[i, round_] if round_ < 2 else rests[i, 0] + 0.5 * math.pi * (round_ - 1)
             )
-            if not minimum_from_circle(
-                ground,
-                stiffness,
-                form,
-                links[i],
-                register,
-                _TOLERANCE,
-                _MOST_ITERATIONS,
-                _TURN_CAP,
-                trial,
-                force,
-                figure,
-            ):
+            if not minimum_from_circle(steps, links[i], register, limits, trial, force, figure):
                 failed += 1
                 continue
             known = False

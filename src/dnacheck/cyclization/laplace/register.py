@@ -130,7 +130,7 @@ def _seeds(search: RingSearch) -> dict[int, list[tuple[Array, Array]]]:
         if link not in seeds:
             circle = np.empty((chain.n_steps, 3))
             scratch = np.empty((chain.n_steps, 3))
-            register = best_register(chain.ground, chain.stiffness, chain.form_code, link, scratch)
+            register = best_register(chain.arrays, link, scratch)
             fill_circle(chain.ground, chain.form_code, link, register, circle)
             seeds[link] = [(circle, np.zeros(ROWS))]
     return seeds

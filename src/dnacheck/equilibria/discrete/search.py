@@ -146,15 +146,11 @@ def search_minima(
     figures = np.empty((most, nk.N_FIGURES))
     began = time.perf_counter()
     found, starts, failed = search(
-        chain.ground,
-        chain.stiffness,
-        chain.form_code,
+        chain.arrays,
         np.array(links, dtype=np.int64),
         registers,
         window,
-        options.tolerance,
-        options.max_iterations,
-        options.turn_cap,
+        options.limits._replace(minima_only=True),
         angles,
         multipliers,
         figures,

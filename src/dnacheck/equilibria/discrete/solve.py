@@ -57,6 +57,16 @@ class NewtonOptions:
         if not 0.0 < self.turn_cap <= np.pi:
             raise InputError(f"turn_cap must lie in (0, pi], not {self.turn_cap}")
 
+    @property
+    def limits(self) -> nk.NewtonLimits:
+        """The same for compiled kernels."""
+        return nk.NewtonLimits(
+            float(self.tolerance),
+            int(self.max_iterations),
+            float(self.turn_cap),
+            bool(self.minima_only),
+        )
+
 
 @dataclass(frozen=True)
 class DiscreteRing:
@@ -220,13 +230,8 @@ def solve_ring(
     code = nk.newton(
         angles,
         multipliers,
-        chain.ground,
-        chain.stiffness,
-        chain.form_code,
-        options.tolerance,
-        options.max_iterations,
-        options.turn_cap,
-        options.minima_only,
+        chain.arrays,
+        options.limits,
         figures,
     )
     ring = make_ring(chain, angles, multipliers, figures, code, time.perf_counter() - began)

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from dnacheck.equilibria.discrete.kernels.factorisation import _coupling, _midstep_block
+from dnacheck.equilibria.discrete.kernels.factorisation import coupling, midstep_block
 from dnacheck.model.chain_kernels import WEDGE
 
 ROWS = 7
@@ -166,7 +166,7 @@ def factorise_slice(
         y = centres[n, 1] - centres[s + 1, 1]
         zz = centres[n, 2] - centres[s + 1, 2]
         for k in range(3):
-            _coupling(axes[s, k], x, y, zz, multipliers, e[k])
+            coupling(axes[s, k], x, y, zz, multipliers, e[k])
             for i in range(ROWS):
                 total = 0.0
                 for j in range(ROWS):
@@ -182,7 +182,7 @@ def factorise_slice(
                 ep[k, i] = total
                 u[k, i] = rows[s, k, i] - total
         if form != WEDGE:
-            _midstep_block(halves[s], x, y, zz, multipliers, d)
+            midstep_block(halves[s], x, y, zz, multipliers, d)
         for k in range(3):
             for j in range(k + 1):
                 if form == WEDGE:

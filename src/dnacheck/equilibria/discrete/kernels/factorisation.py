@@ -84,7 +84,7 @@ def _store(rows: Any, s: int, at: int, v: Any) -> None:
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
-def _coupling(axis: Any, x: float, y: float, z: float, m: Any, out: Any) -> None:
+def coupling(axis: Any, x: float, y: float, z: float, m: Any, out: Any) -> None:
     """e = (a x d) x force + a x moment / 2 for an axis a (3,) and d = r_N - p."""
     a0, a1, a2 = axis[0], axis[1], axis[2]
     b0 = a1 * z - a2 * y
@@ -96,11 +96,11 @@ def _coupling(axis: Any, x: float, y: float, z: float, m: Any, out: Any) -> None
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
-def _midstep_block(halves: Any, x: float, y: float, z: float, m: Any, block: Any) -> None:
+def midstep_block(halves: Any, x: float, y: float, z: float, m: Any, block: Any) -> None:
     """Second derivatives of closure within one mid-step, lower triangle of ``block`` (3, 3)."""
     e = np.empty((5, 3))
     for k in range(5):
-        _coupling(halves[k], x, y, z, m, e[k])
+        coupling(halves[k], x, y, z, m, e[k])
     for i in range(3):
         for j in range(3):
             block[i, j] = 0.0
@@ -182,7 +182,7 @@ def factorise(
         d00, d10, d11 = _dot(u0, e0), _dot(u0, e1), _dot(u1, e1)
         d20, d21, d22 = _dot(u0, e2), _dot(u1, e2), _dot(u2, e2)
         if form != WEDGE:
-            _midstep_block(halves[s], d[0], d[1], d[2], multipliers, block)
+            midstep_block(halves[s], d[0], d[1], d[2], multipliers, block)
             d00 += block[0, 0] + held * _dot(a0, a0) - _dot(a0, e0)
             d10 += block[1, 0] + held * _dot(a0, a1) - _dot(a0, e1)
             d11 += block[1, 1] + held * _dot(a1, a1) - _dot(a1, e1)

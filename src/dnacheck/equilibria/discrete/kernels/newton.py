@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -24,12 +24,23 @@ from dnacheck.equilibria.discrete.kernels.moves import (
     new_state,
     residuals,
 )
+from dnacheck.model.chain_kernels import HingeSteps
 
 CONVERGED = 0
 ITERATION_LIMIT = 1
 STEP_LIMIT = 2
 NOT_FINITE = 3
 SINGULAR = 4
+
+
+class NewtonLimits(NamedTuple):
+    """When a solve ends and how far it may go at once; see ``NewtonOptions``."""
+
+    tolerance: float
+    max_iterations: int
+    turn_cap: float
+    minima_only: bool
+
 
 # Positions of the figures that a solve returns.
 ENERGY, RESIDUAL, CLOSURE, NEGATIVES, LOG_DET_KKT, ITERATIONS, WEAKEST_PIVOT, NEUTRAL = range(8)
@@ -85,13 +96,8 @@ def _inspect(
 def newton(
     angles: Any,
     multipliers: Any,
-    ground: Any,
-    stiffness: Any,
-    form: int,
-    tolerance: float,
-    max_iterations: int,
-    turn_cap: float,
-    minima_only: bool,
+    steps: HingeSteps,
+    limits: NewtonLimits,
     figures: Any,
 ) -> int:
     """Move ``angles`` (N, 3) and ``multipliers`` (6,) to a closed equilibrium, in place.
@@ -108,6 +114,9 @@ def newton(
     pivot and the number of eigenvalues that are zero to round-off. Every exit has a code; no loop
     is unbounded.
     """
+    ground, stiffness, form = steps.ground, steps.stiffness, steps.form
+    tolerance, max_iterations = limits.tolerance, limits.max_iterations
+    turn_cap, minima_only = limits.turn_cap, limits.minima_only
     n = angles.shape[0]
     state = new_state(n, form)
     trial = new_state(n, form)

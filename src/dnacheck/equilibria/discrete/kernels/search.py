@@ -14,9 +14,11 @@ from dnacheck.equilibria.discrete.kernels.newton import (
     N_FIGURES,
     NEGATIVES,
     NEUTRAL,
+    NewtonLimits,
     newton,
 )
 from dnacheck.equilibria.discrete.kernels.starts import circle_registers, fill_circle
+from dnacheck.model.chain_kernels import HingeSteps
 
 # Two minima are one when their energies agree to this relative precision and their angles to
 # the second figure, in radians; converged solutions agree far better.
@@ -25,9 +27,9 @@ _SAME_ANGLES = 1e-4
 
 
 @njit(cache=True, nogil=True)
-def best_register(ground: Any, stiffness: Any, form: int, link: int, scratch: Any) -> float:
+def best_register(steps: HingeSteps, link: int, scratch: Any) -> float:
     """Register of lowest predicted energy of the planar ring; see :func:`circle_registers`."""
-    circle_registers(ground, stiffness, form, link, scratch[0])
+    circle_registers(steps.ground, steps.stiffness, steps.form, link, scratch[0])
     return scratch[0, 0]
 
 
@@ -51,14 +53,10 @@ def _known(trial: Any, energy: float, neutral: bool, found: int, angles: Any, fi
 
 @njit(cache=True, nogil=True)
 def minimum_from_circle(
-    ground: Any,
-    stiffness: Any,
-    form: int,
+    steps: HingeSteps,
     link: int,
     register: float,
-    tolerance: float,
-    max_iterations: int,
-    turn_cap: float,
+    limits: NewtonLimits,
     angles: Any,
     multipliers: Any,
     figures: Any,
@@ -67,35 +65,20 @@ def minimum_from_circle(
 
     It fills ``angles`` (N, 3), ``multipliers`` (6,) and ``figures`` (8,); see :func:`newton`.
     """
-    fill_circle(ground, form, link, register, angles)
+    fill_circle(steps.ground, steps.form, link, register, angles)
     multipliers[:] = 0.0
     figures[:] = 0.0
-    code = newton(
-        angles,
-        multipliers,
-        ground,
-        stiffness,
-        form,
-        tolerance,
-        max_iterations,
-        turn_cap,
-        True,
-        figures,
-    )
+    code = newton(angles, multipliers, steps, limits, figures)
     return code == CONVERGED and figures[NEGATIVES] == 0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def search(
-    ground: Any,
-    stiffness: Any,
-    form: int,
+    steps: HingeSteps,
     links: Any,
     registers: Any,
     window: float,
-    tolerance: float,
-    max_iterations: int,
-    turn_cap: float,
+    limits: NewtonLimits,
     angles: Any,
     multipliers: Any,
     figures: Any,
@@ -111,7 +94,7 @@ def search(
     -------
     found, starts, failed : how many distinct minima, starts, and starts that did not converge.
     """
-    n = ground.shape[0]
+    n = steps.ground.shape[0]
     found, starts, failed = 0, 0, 0
     trial = np.empty((n, 3))
     force = np.empty(6)
@@ -123,26 +106,16 @@ def search(
     for round_ in range(2 + registers.shape[0]):
         for i in range(links.shape[0]):
             if round_ == 0:
-                counts[i] = circle_registers(ground, stiffness, form, links[i], rests[i])
+                counts[i] = circle_registers(
+                    steps.ground, steps.stiffness, steps.form, links[i], rests[i]
+                )
             if round_ >= 2 and not energies[i] <= lowest + window:
                 continue
             if round_ == 1 and counts[i] < 2:
                 continue
             register = rests[i, round_] if round_ < 2 else rests[i, 0] + registers[round_ - 2]
             starts += 1
-            if not minimum_from_circle(
-                ground,
-                stiffness,
-                form,
-                links[i],
-                register,
-                tolerance,
-                max_iterations,
-                turn_cap,
-                trial,
-                force,
-                figure,
-            ):
+            if not minimum_from_circle(steps, links[i], register, limits, trial, force, figure):
                 failed += 1
                 continue
             neutral = figure[NEUTRAL] > 0.0
