@@ -29,25 +29,27 @@ class ProjectedInverse:
     """
 
     def __init__(self, chain: Chain, angles: Array, multipliers: Array) -> None:
-        n = chain.n_steps
+        n, steps = chain.n_steps, chain.arrays
+        # Copies: a ring's own arrays are read-only, for which kernels would be compiled anew.
+        angles, multipliers = np.array(angles), np.array(multipliers)
         centres, frames = np.empty((n + 1, 3)), np.empty((n + 1, 3, 3))
         axes, gradient = np.empty((n, 3, 3)), np.empty((n, 3))
         halves = np.empty((n if chain.form_code else 0, 5, 3))
         form = chain.form_code
         linearise(angles, form, centres, frames, axes, halves)
-        energy_gradient(angles, chain.ground, chain.stiffness, gradient)
+        energy_gradient(angles, steps.ground, steps.stiffness, gradient)
         self.length = float(n)
         self.factors = np.empty((n, FACTOR_WIDTH))
         self.small = np.empty((6, 7))
         factorise(
             gradient,
-            chain.stiffness,
+            steps.stiffness,
             0.0,
             form,
             centres,
             axes,
             halves,
-            np.asarray(multipliers),
+            multipliers,
             self.factors,
             self.small,
         )
