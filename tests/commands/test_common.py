@@ -45,7 +45,7 @@ def parse(*arguments):
 def test_defaults_are_those_of_the_paper():
     assert parse() == {
         "target": "11T15",
-        "model": ModelSettings("trifonov2", None, 463.0, 3.4, "auto"),
+        "model": ModelSettings("trifonov2", None, None, None, "auto"),
         "ring": RingSettings("both", "auto"),
         "continuum": ContinuumSettings(15, 20, 6),
         "run": RunSettings(False, 0, available_processors(), False, False),

@@ -16,7 +16,7 @@ import pytest
 from dnacheck.cyclization.laplace.isolated import laplace_log_j
 from dnacheck.equilibria.discrete.search import find_rings
 from dnacheck.model.chain import build_chain
-from dnacheck.model.parameters import load_angle_set
+from dnacheck.model.parameters import load_parameters
 from dnacheck.model.sequence import parse_sequence
 from dnacheck.numerics.outcome import InputError
 from dnacheck.scan.scan import (
@@ -115,7 +115,7 @@ def test_a_molecule_too_long_is_a_row():
 
 def test_a_free_register_has_an_energy_and_no_j(tmp_path):
     """Straight steps of one kind make a straight molecule; its ring may be rolled freely."""
-    table = load_angle_set("trifonov2")
+    table = load_parameters("trifonov2")
     straight = replace(table, ground=np.tile([2 * math.pi / 10.45, 0.0, 0.0], (16, 1)))
     row = scan_row("straight", "A" * 150, {"angles": straight, "a_tracts": "none"})
     assert row[-1] == STATUS_FREE

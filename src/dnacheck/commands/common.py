@@ -21,6 +21,8 @@ from typing import Any, Literal, TypeVar
 
 import click
 
+from dnacheck.model.data_files import PARAMETER_SETS
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -45,13 +47,13 @@ class ModelSettings:
     """Which elastic chain is meant."""
 
     angles: str
-    """Name of an angle set, or path of a TOML file."""
+    """Name of a parameter set, or path of a file with one."""
     twist_ratio: float | None
-    """Twisting over bending stiffness, K_tau / K_theta; None leaves it to the angle set, or 1.5."""
-    persistence_length: float
-    """Å."""
-    rise: float
-    """Å per base-pair step."""
+    """Twisting over bending stiffness, K_tau / K_theta; None leaves it to the set, or 1.5."""
+    persistence_length: float | None
+    """Å; None for 463."""
+    rise: float | None
+    """Å per base-pair step; None for 3.4, or what a set with six parameters brings."""
     a_tracts: Literal["auto", "tracts-only", "none"] | tuple[int, int]
     """Steps with the A-tract twist: by a rule, none, or first and last (0-based, included)."""
 
@@ -224,35 +226,34 @@ def model_options(function: Function) -> Function:
         ModelSettings,
         [
             click.option(
+                "--parameters",
                 "--angles",
                 "model__angles",
-                metavar="trifonov2|trifonov|desantis|FILE",
-                default="trifonov2",
+                metavar=f"{'|'.join(PARAMETER_SETS)}|FILE",
+                default=PARAMETER_SETS[0],
                 show_default=True,
-                help="Angle set, or a TOML file with one.",
+                help="Parameters of the base-pair steps: a set, or a TOML file with one.",
             ),
             click.option(
                 "--twist-ratio",
                 "model__twist_ratio",
                 type=PositiveNumber(),
                 default=None,
-                help="Twisting over bending stiffness.  [default: 1.5, or the angle set's own]",
+                help="Twisting over bending stiffness.  [default: 1.5, or the set's own]",
             ),
             click.option(
                 "--persistence-length",
                 "model__persistence_length",
                 type=PositiveNumber(),
-                default=463.0,
-                show_default=True,
-                help="In Å.",
+                default=None,
+                help="In Å.  [default: 463, or what six parameters bring]",
             ),
             click.option(
                 "--rise",
                 "model__rise",
                 type=PositiveNumber(),
-                default=3.4,
-                show_default=True,
-                help="In Å per base-pair step.",
+                default=None,
+                help="In Å per base-pair step.  [default: 3.4, or what six parameters bring]",
             ),
             click.option(
                 "--a-tracts",

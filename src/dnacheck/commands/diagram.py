@@ -121,7 +121,7 @@ def _components(
     from dnacheck.equilibria.continuation.follow import Bounds
     from dnacheck.equilibria.continuation.options import ContinuationOptions
     from dnacheck.equilibria.continuation.parameters import perfect_rod
-    from dnacheck.model.chain import TWIST_RATIO, build_chain
+    from dnacheck.model.chain import PERSISTENCE_LENGTH_A, RISE_A, TWIST_RATIO, build_chain
     from dnacheck.model.molecules import read_target
     from dnacheck.model.rod import RodOptions, build_rod
     from dnacheck.numerics.outcome import InputError
@@ -131,7 +131,13 @@ def _components(
     alpha = None if start is None else turn * start
     if target == "perfect":
         ratio = TWIST_RATIO if model.twist_ratio is None else model.twist_ratio
-        rod = perfect_rod(n_bp, ratio, model.persistence_length, model.rise)
+        length, rise = model.persistence_length, model.rise
+        rod = perfect_rod(
+            n_bp,
+            ratio,
+            PERSISTENCE_LENGTH_A if length is None else length,
+            RISE_A if rise is None else rise,
+        )
         options = replace(diagram.PERFECT, max_points=max_points)
         if search:
             raise InputError("the perfect diagram is connected: leave out --components")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -105,6 +106,9 @@ def _solve(
 
     chain = build_chain(molecule, **model.chain_arguments())
     warnings = list(chain.warnings)
+    if chain.rigid and ring.model == "both":
+        warnings.append("continuum: left out, for steps of six parameters have none yet")
+        ring = replace(ring, model="discrete")
     equilibria: list[dict[str, Any]] = []
     smooth = discrete = None
     converged = True
@@ -131,7 +135,7 @@ def _solve(
         "n_bp": chain.n_steps,
         "angles": chain.angle_set,
         "twist_ratio": chain.twist_ratio,
-        "persistence_length_A": chain.persistence_length_A,
+        "persistence_length_A": None if chain.rigid else chain.persistence_length_A,
         "rise_A": chain.rise_A,
         "strand": chain.letters,
         "equilibria": equilibria,

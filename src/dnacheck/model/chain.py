@@ -1,4 +1,8 @@
-"""The discrete wedge chain of Section II: ground angles, stiffnesses, frames and energies."""
+"""Discrete chains of elastic base-pair steps: ground values, stiffnesses, frames and energies.
+
+A step has the three wedge angles of Section II, in the paper's product or its mid-step form, or the
+six parameters of a rigid base-pair step.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +16,18 @@ from numpy.typing import ArrayLike, NDArray
 from dnacheck.model.a_tracts import Region, automatic_regions, parse_regions, tract_regions
 from dnacheck.model.chain_kernels import MIDSTEP, WEDGE, HingeSteps, fill_angles, fill_frames
 from dnacheck.model.molecules import Molecule
-from dnacheck.model.parameters import AngleSet, load_angle_set
+from dnacheck.model.parameters import ParameterSet, load_parameters
+from dnacheck.model.rigid_kernels import (
+    RigidSteps,
+    fill_rigid_coordinates,
+    fill_rigid_frames,
+    relaxed_helix_turns,
+)
 from dnacheck.model.sequence import Sequence
 from dnacheck.numerics.outcome import InputError
 
 Array = NDArray[np.float64]
-StepForm = Literal["wedge", "midstep"]
+StepForm = Literal["wedge", "midstep", "rigid"]
 
 PERSISTENCE_LENGTH_A = 463.0
 """Persistence length of Section X, in Å."""
@@ -35,16 +45,24 @@ class Chain:
     ----------
     name, letters, angle_set : str
         Molecule, its letters (empty for a chain made from arrays), and the parameters' name.
-    ground : ndarray, shape (N, 3)
-        Unstressed tau, theta, phi of step i, which turns frame i into frame i+1; radians.
-    stiffness : ndarray, shape (N, 3, 3)
-        Symmetric positive stiffness of each step in the same order, reduced (K_theta = 1).
+    ground : ndarray, shape (N, c)
+        Unstressed coordinates of step i, which leads from frame i to frame i+1. Three angles tau,
+        theta, phi in radians; or, for rigid steps, twist, tilt, roll in radians and shift, slide,
+        rise in units of ``rise_A``. The first is the twist of both.
+    stiffness : ndarray, shape (N, c, c)
+        Symmetric positive stiffness of each step in the same order, in the reduced unit of energy.
+    persistence_length_A : float
+        Sets the reduced unit of energy: K_theta = RT P/l is 1. For rigid steps, whose stiffness is
+        in RT, it is the rise, so that the reduced energy is the energy in RT.
+    rise_A : float
+        Å; the unit of length of centres. For rigid steps the mean of their ground rise.
     energy_scale_RT : float
         RT per reduced unit of energy: persistence length over rise.
     twist_ratio : float or None
         K_tau / K_theta where the stiffness is the uniform diagonal one, else None.
-    step_form : {"wedge", "midstep"}
-        How the three angles make a rotation; the wedge is the paper's (2.1).
+    step_form : {"wedge", "midstep", "rigid"}
+        How the coordinates make a step: three angles as the paper's wedge (2.1) or its mid-step
+        form, or six parameters.
     a_tract_regions : tuple of (first, last)
         Steps that took the A-tract twist, from 0, both ends included.
     """
@@ -64,8 +82,14 @@ class Chain:
     def __post_init__(self) -> None:
         ground = np.array(self.ground, dtype=float, order="C")
         stiffness = np.array(self.stiffness, dtype=float, order="C")
-        if ground.ndim != 2 or ground.shape[1] != 3 or stiffness.shape != (*ground.shape, 3):
-            raise InputError("a chain needs ground angles (N, 3) and stiffnesses (N, 3, 3)")
+        if self.step_form not in ("wedge", "midstep", "rigid"):
+            raise InputError(f"step form '{self.step_form}' is not wedge, midstep or rigid")
+        c = 6 if self.step_form == "rigid" else 3
+        if ground.ndim != 2 or ground.shape[1] != c or stiffness.shape != (*ground.shape, c):
+            raise InputError(
+                f"a {self.step_form} chain needs ground values (N, {c}) and stiffnesses "
+                f"(N, {c}, {c})"
+            )
         if not (np.all(np.isfinite(ground)) and np.all(np.isfinite(stiffness))):
             raise InputError("ground angles and stiffnesses must be finite")
         for value, name in (
@@ -74,8 +98,6 @@ class Chain:
         ):
             if not (np.isfinite(value) and value > 0.0):
                 raise InputError(f"{name} must be a positive number of Å, not {value}")
-        if self.step_form not in ("wedge", "midstep"):
-            raise InputError(f"step form '{self.step_form}' is neither wedge nor midstep")
         ground.setflags(write=False)
         stiffness.setflags(write=False)
         object.__setattr__(self, "ground", ground)
@@ -88,26 +110,59 @@ class Chain:
 
     @property
     def energy_scale_RT(self) -> float:
-        """RT per reduced unit of energy, K_theta = RT P/l (Section X)."""
+        """RT per reduced unit of energy, K_theta = RT P/l (Section X); 1 for rigid steps."""
         return self.persistence_length_A / self.rise_A
 
     @property
+    def rigid(self) -> bool:
+        """Whether the steps have six parameters."""
+        return self.step_form == "rigid"
+
+    def require_hinges(self, what: str) -> None:
+        """Refuse steps with six parameters where ``what`` knows three angles alone.
+
+        Raises
+        ------
+        InputError
+        """
+        if self.rigid:
+            raise InputError(
+                f"{what} is not available for the six parameters of '{self.angle_set}'; use a set "
+                "with three angles, such as trifonov2"
+            )
+
+    @property
     def form_code(self) -> int:
-        """Integer of the step form, for compiled kernels."""
+        """Integer of the form of three-angle steps, for compiled kernels.
+
+        Raises
+        ------
+        InputError
+            The steps have six parameters.
+        """
+        self.require_hinges("this computation")
         return WEDGE if self.step_form == "wedge" else MIDSTEP
 
     @cached_property
-    def arrays(self) -> HingeSteps:
+    def arrays(self) -> HingeSteps | RigidSteps:
         """What compiled kernels read of the steps: copies of the arrays, made once.
 
         They are writable only because a kernel is compiled anew for read-only arrays; nothing
         writes to them.
         """
+        if self.rigid:
+            return RigidSteps(self.ground.copy(), self.stiffness.copy())
         return HingeSteps(self.ground.copy(), self.stiffness.copy(), self.form_code)
 
     @property
     def relaxed_turns(self) -> float:
-        """Sum of the ground twists in turns, the reference for choosing links."""
+        """Turns of the unstressed chain, the reference for choosing links.
+
+        The sum of the ground twists; for rigid steps with what the mean bend of all steps, which
+        makes the chain a helix about an axis of its own, adds to it.
+        """
+        if self.rigid:
+            return float(relaxed_helix_turns(self.arrays.ground))
         return float(self.ground[:, 0].sum() / (2.0 * np.pi))
 
     def with_twist_ratio(self, twist_ratio: float) -> Chain:
@@ -158,30 +213,31 @@ def _regions(molecule: Molecule, choice: str | tuple[Region, ...]) -> tuple[Regi
 
 def build_chain(
     molecule: Molecule | Sequence,
-    angles: str | AngleSet = "trifonov2",
+    angles: str | ParameterSet = "trifonov2",
     twist_ratio: float | None = None,
-    persistence_length_A: float = PERSISTENCE_LENGTH_A,
-    rise_A: float = RISE_A,
+    persistence_length_A: float | None = None,
+    rise_A: float | None = None,
     a_tracts: str | tuple[Region, ...] = "auto",
     step_form: StepForm = "wedge",
 ) -> Chain:
-    """Chain of a molecule from its letters and an angle set.
+    """Chain of a molecule from its letters and a parameter set.
 
     Parameters
     ----------
     molecule : Molecule or Sequence
         What is read 5' to 3'; the strand matters for the wedge form (up to 2.5 % in energy).
-    angles : str or AngleSet
-        Embedded name, TOML file, or a set already loaded.
+    angles : str or ParameterSet
+        Embedded name, file (see :func:`load_parameters`), or a set already loaded.
     twist_ratio : float, optional
         K_tau / K_theta of the uniform stiffness; default 1.5. Not allowed for a set that brings
         stiffnesses of its own.
-    persistence_length_A, rise_A : float
-        Give the energy unit K_theta = RT P/l; in Å.
+    persistence_length_A, rise_A : float, optional
+        Give the energy unit K_theta = RT P/l; in Å, 463 and 3.4 by default. Not allowed for rigid
+        steps, which bring lengths and energies of their own.
     a_tracts : "auto", "tracts-only", "none", "A..B", or regions
         Steps that take the set's A-tract twist; without effect for a set that has none.
     step_form : {"wedge", "midstep"}
-        The paper's wedge, or its form symmetrised in the strands.
+        The paper's wedge, or its form symmetrised in the strands. Of no effect for rigid steps.
 
     Raises
     ------
@@ -190,33 +246,43 @@ def build_chain(
     """
     if isinstance(molecule, Sequence):
         molecule = Molecule(molecule)
-    table = load_angle_set(angles) if isinstance(angles, str) else angles
-    steps = molecule.sequence.step_indices()
-    ground = table.ground[steps]
+    table = load_parameters(angles) if isinstance(angles, str) else angles
+    rows = table.rows(molecule.sequence.step_indices())
+    ground = table.ground[rows]
     regions: tuple[Region, ...] = ()
     if table.a_tract_twist is not None:
         regions = _regions(molecule, a_tracts)
         for first, last in regions:
             ground[first : last + 1, 0] = table.a_tract_twist
     elif a_tracts not in ("auto", "none"):
-        raise InputError(f"angle set '{table.name}' has no A-tract twist; use a_tracts none")
+        raise InputError(f"parameter set '{table.name}' has no A-tract twist; use a_tracts none")
+    if table.kind == "rigid":
+        for value, name in (
+            (twist_ratio, "twist ratio"),
+            (persistence_length_A, "persistence length"),
+            (rise_A, "rise"),
+        ):
+            if value is not None:
+                raise InputError(
+                    f"parameter set '{table.name}' has lengths and stiffnesses of its own; leave "
+                    f"out the {name}"
+                )
+        return _rigid_chain(molecule, table, rows, ground, regions)
+    persistence_length_A = (
+        PERSISTENCE_LENGTH_A if persistence_length_A is None else persistence_length_A
+    )
+    rise_A = RISE_A if rise_A is None else rise_A
     if table.stiffness is None:
         ratio = TWIST_RATIO if twist_ratio is None else float(twist_ratio)
-        stiffness = uniform_stiffness(len(steps), ratio)
+        stiffness = uniform_stiffness(len(rows), ratio)
     elif twist_ratio is not None:
         raise InputError(
-            f"angle set '{table.name}' has stiffnesses of its own; leave out the twist ratio"
+            f"parameter set '{table.name}' has stiffnesses of its own; leave out the twist ratio"
         )
     else:
         ratio = None
         scale = rise_A / persistence_length_A if table.stiffness_in_RT else 1.0
-        stiffness = scale * table.stiffness[steps]
-    warnings: tuple[str, ...] = ()
-    if not table.strand_symmetric:
-        warnings = (
-            f"angle set '{table.name}' departs from the strand relation by "
-            f"{table.strand_asymmetry:.3g}; the two strands are different molecules to it",
-        )
+        stiffness = scale * table.stiffness[rows]
     return Chain(
         name=molecule.name,
         letters=molecule.sequence.letters,
@@ -228,7 +294,36 @@ def build_chain(
         twist_ratio=ratio,
         step_form=step_form,
         a_tract_regions=regions,
-        warnings=warnings,
+        warnings=(table.strand_note,) if table.strand_note else (),
+    )
+
+
+def _rigid_chain(
+    molecule: Molecule,
+    table: ParameterSet,
+    rows: NDArray[np.intp],
+    ground: Array,
+    regions: tuple[Region, ...],
+) -> Chain:
+    """Chain of rigid steps; its unit of length is the mean rise, its unit of energy RT."""
+    if table.stiffness is None:
+        raise InputError(f"parameter set '{table.name}' has no stiffness; six parameters need one")
+    rise = float(ground[:, 5].mean())
+    if not rise > 0.0:
+        raise InputError(f"parameter set '{table.name}': the mean rise of the steps is {rise} Å")
+    ground[:, 3:] /= rise
+    units = np.array([1.0, 1.0, 1.0, rise, rise, rise])
+    return Chain(
+        name=molecule.name,
+        letters=molecule.sequence.letters,
+        angle_set=table.name,
+        ground=ground,
+        stiffness=table.stiffness[rows] * np.outer(units, units),
+        persistence_length_A=rise,
+        rise_A=rise,
+        step_form="rigid",
+        a_tract_regions=regions,
+        warnings=(table.strand_note,) if table.strand_note else (),
     )
 
 
@@ -237,8 +332,8 @@ def chain_frames(angles: ArrayLike, step_form: StepForm = "wedge") -> tuple[Arra
 
     Parameters
     ----------
-    angles : array_like, shape (N, 3)
-        tau, theta, phi of each step in radians.
+    angles : array_like, shape (N, c)
+        Coordinates of each step: tau, theta, phi in radians, or the six of a rigid step.
 
     Returns
     -------
@@ -250,20 +345,37 @@ def chain_frames(angles: ArrayLike, step_form: StepForm = "wedge") -> tuple[Arra
     angles = np.ascontiguousarray(angles, dtype=float)
     centres = np.empty((len(angles) + 1, 3))
     frames = np.empty((len(angles) + 1, 3, 3))
+    if step_form == "rigid":
+        fill_rigid_frames(angles, centres, frames)
+        return centres, frames
     fill_frames(angles, WEDGE if step_form == "wedge" else MIDSTEP, centres, frames)
     return centres, frames
 
 
 def angles_of_frames(frames: ArrayLike, step_form: StepForm = "wedge") -> Array:
-    """Step angles (N, 3) between successive frames (N+1, 3, 3), in radians."""
+    """Angles (N, 3) of hinge steps between successive frames (N+1, 3, 3), in radians."""
     frames = np.ascontiguousarray(frames, dtype=float)
     angles = np.empty((len(frames) - 1, 3))
     fill_angles(frames, WEDGE if step_form == "wedge" else MIDSTEP, angles)
     return angles
 
 
+def rigid_coordinates(centres: ArrayLike, frames: ArrayLike) -> Array:
+    """Six coordinates (N, 6) of the rigid steps between successive base pairs.
+
+    Parameters
+    ----------
+    centres, frames : array_like, shapes (N+1, 3) and (N+1, 3, 3)
+        Directors in the columns of a frame.
+    """
+    frames = np.ascontiguousarray(frames, dtype=float)
+    coordinates = np.empty((len(frames) - 1, 6))
+    fill_rigid_coordinates(np.ascontiguousarray(centres, dtype=float), frames, coordinates)
+    return coordinates
+
+
 def elastic_energy(chain: Chain, angles: ArrayLike) -> float:
-    """Reduced energy (2.3) of the chain in given angles (N, 3)."""
+    """Reduced energy (2.3) of the chain in given coordinates (N, c)."""
     bend, twist = energy_parts(chain, angles)
     return bend + twist
 
@@ -271,8 +383,8 @@ def elastic_energy(chain: Chain, angles: ArrayLike) -> float:
 def energy_parts(chain: Chain, angles: ArrayLike) -> tuple[float, float]:
     """Bending and twisting parts of the reduced energy (2.3).
 
-    The twisting part is the terms of tau alone; couplings of tau to the bends, where a stiffness
-    has them, count as bending, so the parts add up to the energy.
+    The twisting part is the terms of the twist alone; couplings of the twist, where a stiffness has
+    them, and the translations of rigid steps count as bending, so the parts add up to the energy.
     """
     strain = np.asarray(angles, dtype=float) - chain.ground
     total = 0.5 * float(np.einsum("ij,ijk,ik->", strain, chain.stiffness, strain))

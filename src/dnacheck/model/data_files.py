@@ -1,9 +1,12 @@
-"""Where the tables that ship with the package lie."""
+"""Where the tables that ship with the package lie, and the names of its parameter sets."""
 
 from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
+
+PARAMETER_SETS = ("trifonov2", "trifonov", "desantis", "olson1998")
+"""Names of the parameter sets in ``data/angle_sets``, the default first."""
 
 
 @cache

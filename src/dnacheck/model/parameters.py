@@ -1,280 +1,220 @@
-"""Angle sets: ground angles and stiffnesses of the 16 base-pair steps, from TOML files."""
+"""Parameter sets: ground values and stiffnesses of base-pair steps, with three angles or six.
+
+A set of *hinge* steps has three angles about a pivot (tau, theta, phi: the paper's wedge angles); a
+set of *rigid* steps has the six parameters of the field's convention. Both may depend on the step
+alone (16 of them) or on its neighbours too (256 tetranucleotides, the step in the middle).
+"""
 
 from __future__ import annotations
 
-import math
-import tomllib
+import itertools
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dnacheck.model.data_files import data_directory
-from dnacheck.model.sequence import STEP_NAMES, reverse_complement
+from dnacheck.model.data_files import PARAMETER_SETS, data_directory
+from dnacheck.model.sequence import BASES, STEP_NAMES, complement, reverse_complement
 from dnacheck.numerics.outcome import InputError
 
 Array = NDArray[np.float64]
+StepKind = Literal["hinge", "rigid"]
 
-EMBEDDED_SETS = ("trifonov2", "trifonov", "desantis")
-ANGLE_NAMES = ("tau", "theta", "phi")
-SYMMETRY_TOLERANCE_RAD = 1e-9
-"""Largest departure from the strand relation that passes as rounding, in radians or relative."""
+COORDINATES: dict[StepKind, tuple[str, ...]] = {
+    "hinge": ("tau", "theta", "phi"),
+    "rigid": ("twist", "tilt", "roll", "shift", "slide", "rise"),
+}
+"""Order of a step's coordinates in the arrays of a set; the first is the twist of both kinds."""
 
-# Signs that the strand relation gives to tau, theta, phi.
-_STRAND_SIGNS = np.array([1.0, 1.0, -1.0])
-_COMPLEMENT_STEP = tuple(STEP_NAMES.index(reverse_complement(name)) for name in STEP_NAMES)
-_KNOWN_KEYS = {
-    "name", "citation", "unit", "steps", "stiffness_unit", "strand_symmetric",
-    "derived_from", "bend_scale", "helical_repeat_bp", "a_tract_helical_repeat_bp",
-}  # fmt: skip
-_KNOWN_STEP_KEYS = {"tau", "theta", "phi", "stiffness"}
+STRAND_SIGNS: dict[StepKind, Array] = {
+    "hinge": np.array([1.0, 1.0, -1.0]),
+    "rigid": np.array([1.0, -1.0, 1.0, -1.0, 1.0, 1.0]),
+}
+"""What reading the other strand does to them: phi, or tilt and shift, change sign."""
+
+TETRANUCLEOTIDES = tuple("".join(letters) for letters in itertools.product(BASES, repeat=4))
+
+SYMMETRY_TOLERANCE = 1e-9
+"""Largest departure from the strand relation that passes as rounding: radians, Å, or relative."""
 
 
 @dataclass(frozen=True)
-class AngleSet:
-    """Ground angles and stiffnesses of all base-pair steps.
+class ParameterSet:
+    """Ground values and stiffnesses of all base-pair steps.
 
     Attributes
     ----------
     name, citation : str
         What it is called and where it comes from.
-    ground : ndarray, shape (16, 3)
-        Unstressed tau, theta, phi of each step of ``STEP_NAMES``, in radians.
-    stiffness : ndarray, shape (16, 3, 3), or None
-        Symmetric positive stiffness in the same order. None stands for the paper's uniform
-        diagonal one, whose ratio of twist to bend is chosen with the chain.
+    kind : {"hinge", "rigid"}
+        Three angles about a pivot, or six rigid-body parameters.
+    ground : ndarray, shape (K, c)
+        Unstressed coordinates of each step, in the order of ``COORDINATES[kind]``; radians and,
+        for the three translations of a rigid step, Å. K is 16 (``STEP_NAMES``) or 256
+        (``TETRANUCLEOTIDES``).
+    stiffness : ndarray, shape (K, c, c), or None
+        Symmetric positive stiffness in the same order. None, for hinges alone, stands for the
+        paper's uniform diagonal one, whose ratio of twist to bend is chosen with the chain.
     stiffness_in_RT : bool
-        Whether ``stiffness`` is in RT/rad^2; otherwise it is reduced (1 is RT P/l).
+        Whether ``stiffness`` is in RT (per radian and Å); otherwise, for hinges, it is reduced (1
+        is RT P/l).
     a_tract_twist : float or None
         Twist in radians of steps inside an A-tract region, if the set has one.
     strand_asymmetry : float
-        Largest departure from the strand relation, in radians or relative stiffness.
+        Largest departure from the strand relation: in radians or Å, or relative stiffness.
+    asymmetric_steps : tuple of str
+        Steps that break the relation.
+    unreversed_steps : tuple of str
+        Those of them that are not printed in tables of the ten unique steps and have the values
+        of their complement unreversed: somebody complemented the letters and stopped there.
     """
 
     name: str
     citation: str
+    kind: StepKind
     ground: Array
     stiffness: Array | None
     stiffness_in_RT: bool
     a_tract_twist: float | None
     strand_asymmetry: float
+    asymmetric_steps: tuple[str, ...] = ()
+    unreversed_steps: tuple[str, ...] = ()
 
     @property
     def strand_symmetric(self) -> bool:
         """Whether both strands give the same parameters."""
-        return self.strand_asymmetry <= SYMMETRY_TOLERANCE_RAD
+        return self.strand_asymmetry <= SYMMETRY_TOLERANCE
+
+    @property
+    def context(self) -> int:
+        """Letters that a step's parameters depend on: 2, or 4 with its neighbours."""
+        return 2 if len(self.ground) == len(STEP_NAMES) else 4
+
+    @property
+    def strand_note(self) -> str:
+        """One line on the strand relation; empty where it holds."""
+        if self.strand_symmetric:
+            return ""
+        named = ", ".join(self.asymmetric_steps[:8])
+        more = len(self.asymmetric_steps) - 8
+        note = (
+            f"parameter set '{self.name}' departs from the strand relation by "
+            f"{self.strand_asymmetry:.3g} on step {named}"
+            f"{f' and {more} more' if more > 0 else ''}; "
+            "the two strands are different molecules to it"
+        )
+        if self.unreversed_steps:
+            note += f"; {', '.join(self.unreversed_steps[:8])}: complemented without being reversed"
+        return note
+
+    def rows(self, step_indices: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Row of the set for each step of a closed molecule.
+
+        Parameters
+        ----------
+        step_indices : ndarray of int, shape (N,)
+            Of :meth:`dnacheck.model.sequence.Sequence.step_indices`.
+        """
+        if self.context == 2:
+            return step_indices
+        before = np.roll(step_indices, 1) // 4
+        after = np.roll(step_indices, -1) % 4
+        return (64 * before + 4 * step_indices + after).astype(np.intp)
 
 
-def load_angle_set(name: str) -> AngleSet:
-    """An embedded angle set by name, or one from a TOML file (``data/angle_sets/README.md``).
+def load_parameters(name: str) -> ParameterSet:
+    """An embedded parameter set by name, or one from files of your own.
+
+    Parameters
+    ----------
+    name : str
+        One of ``PARAMETER_SETS``; the path of a TOML file (``data/angle_sets/README.md``); or two
+        paths with a comma between, the step parameters and the force constants that emDNA packs
+        (lines such as ``AA={...}`` with 6 and with 36 numbers).
 
     Raises
     ------
     InputError
         Unknown name, unreadable file, missing step, unknown key, non-positive or asymmetric
-        stiffness, or a broken strand relation that the file does not declare.
+        stiffness, numbers in another unit, or a broken strand relation that a TOML file does not
+        declare.
     """
-    if name in EMBEDDED_SETS:
-        return _load(data_directory() / "angle_sets" / f"{name}.toml")
+    if name in PARAMETER_SETS:
+        return _embedded(name)
+    from dnacheck.model.parameter_files import read_emdna_pair, read_parameter_file
+
+    if "," in name and not Path(name).exists():
+        steps, _, forces = name.partition(",")
+        return read_emdna_pair(Path(steps.strip()), Path(forces.strip()))
     path = Path(name)
     if not path.exists():
         raise InputError(
-            f"angle set '{name}' is neither {', '.join(EMBEDDED_SETS)} nor a parameter file"
+            f"parameter set '{name}' is neither {', '.join(PARAMETER_SETS)} nor a parameter file"
         )
-    return _read(path)
+    return read_parameter_file(path)
 
 
-@lru_cache(maxsize=8)
-def _load(path: Path) -> AngleSet:
-    return _read(path)
+@lru_cache(maxsize=len(PARAMETER_SETS))
+def _embedded(name: str) -> ParameterSet:
+    from dnacheck.model.parameter_files import read_parameter_file
+
+    return read_parameter_file(data_directory() / "angle_sets" / f"{name}.toml")
 
 
-def _read(path: Path) -> AngleSet:
-    try:
-        text = path.read_text(encoding="utf-8")
-        table = tomllib.loads(text)
-    except OSError as error:
-        raise InputError(f"file '{path}': {error.strerror or error}; check the path") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"file '{path}': not valid TOML: {error}") from None
-    return _Reader(path, text, table).angle_set()
+def step_names(count: int) -> tuple[str, ...]:
+    """Names of the steps of a set with so many."""
+    return STEP_NAMES if count == len(STEP_NAMES) else TETRANUCLEOTIDES
 
 
-class _Reader:
-    """Checks one parameter file; every complaint names the file, the line and the mend."""
+def other_strand(
+    kind: StepKind,
+    ground: Array,
+    stiffness: Array | None,
+    read: Callable[[str], str] = reverse_complement,
+) -> tuple[Array, Array | None]:
+    """The set as the other strand reads it: what each step's partner says of it.
 
-    def __init__(self, path: Path, text: str, table: dict[str, Any]) -> None:
-        self.path, self.text, self.table = path, text, table
-
-    def fail(self, message: str, *anchors: str) -> InputError:
-        """An error at the line where the anchors follow one another in the file."""
-        line = 0
-        lines = self.text.splitlines()
-        for anchor in anchors:
-            for number in range(line, len(lines)):
-                if anchor in lines[number]:
-                    line = number + 1
-                    break
-        place = f", line {line}" if line else ""
-        return InputError(f"file '{self.path}'{place}: {message}")
-
-    def number(self, table: dict[str, Any], key: str, *anchors: str) -> float:
-        value = table.get(key)
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.fail(f"'{key}' must be a number, not {value!r}", *anchors, key)
-        if not math.isfinite(value):
-            raise self.fail(f"'{key}' must be finite", *anchors, key)
-        return float(value)
-
-    def text_value(self, key: str, default: str) -> str:
-        value = self.table.get(key, default)
-        if not isinstance(value, str):
-            raise self.fail(f"'{key}' must be text in quotes", key)
-        return value
-
-    def angle_set(self) -> AngleSet:
-        unknown = sorted(set(self.table) - _KNOWN_KEYS)
-        if unknown:
-            raise self.fail(
-                f"unknown key '{unknown[0]}'; known are {', '.join(sorted(_KNOWN_KEYS))}",
-                unknown[0],
-            )
-        ground, stiffness = self.derived() if "derived_from" in self.table else self.steps()
-        if "helical_repeat_bp" in self.table:
-            ground[:, 0] = self.repeat("helical_repeat_bp")
-        tract = None
-        if "a_tract_helical_repeat_bp" in self.table:
-            tract = self.repeat("a_tract_helical_repeat_bp")
-        asymmetry = strand_asymmetry(ground, stiffness)
-        meant = self.table.get("strand_symmetric", True) is False
-        if asymmetry > SYMMETRY_TOLERANCE_RAD and not meant:
-            step = STEP_NAMES[_worst_step(ground, stiffness)]
-            raise self.fail(
-                f"step {step} and its reverse complement {reverse_complement(step)} break the "
-                "strand relation (same tau and theta, opposite phi); mend the table, or say "
-                "strand_symmetric = false if it is meant",
-                f"[steps.{step}]",
-            )
-        unit = self.text_value("stiffness_unit", "reduced")
-        if unit not in ("reduced", "RT/rad^2"):
-            raise self.fail('\'stiffness_unit\' must be "reduced" or "RT/rad^2"', "stiffness_unit")
-        ground.setflags(write=False)
-        if stiffness is not None:
-            stiffness.setflags(write=False)
-        return AngleSet(
-            name=self.text_value("name", self.path.stem),
-            citation=self.text_value("citation", "no citation given"),
-            ground=ground,
-            stiffness=stiffness,
-            stiffness_in_RT=unit == "RT/rad^2",
-            a_tract_twist=tract,
-            strand_asymmetry=asymmetry,
-        )
-
-    def repeat(self, key: str) -> float:
-        value = self.number(self.table, key)
-        if value <= 0.0:
-            raise self.fail(f"'{key}' must be positive (base pairs per turn)", key)
-        return 2.0 * math.pi / value
-
-    def derived(self) -> tuple[Array, Array | None]:
-        base = self.text_value("derived_from", "")
-        if base not in EMBEDDED_SETS or base == self.path.stem:
-            raise self.fail(
-                f"'derived_from' must be one of {', '.join(EMBEDDED_SETS)}", "derived_from"
-            )
-        if "steps" in self.table:
-            raise self.fail("give either 'derived_from' or [steps.XY] tables, not both", "[steps")
-        parent = load_angle_set(base)
-        ground = parent.ground.copy()
-        ground[:, 1:] *= self.number(self.table, "bend_scale") if "bend_scale" in self.table else 1
-        return ground, None
-
-    def steps(self) -> tuple[Array, Array | None]:
-        steps = self.table.get("steps")
-        if not isinstance(steps, dict):
-            raise self.fail("no [steps.XY] tables; give one for each of the 16 steps")
-        unknown = sorted(set(steps) - set(STEP_NAMES))
-        if unknown:
-            raise self.fail(f"'{unknown[0]}' is not a base-pair step", f"[steps.{unknown[0]}")
-        missing = [name for name in STEP_NAMES if name not in steps]
-        if missing:
-            raise self.fail(f"missing step {', '.join(missing)}; all 16 are needed")
-        unit = self.text_value("unit", "degree")
-        if unit not in ("degree", "radian"):
-            raise self.fail('\'unit\' must be "degree" or "radian"', "unit")
-        factor = math.pi / 180.0 if unit == "degree" else 1.0
-        ground = np.empty((16, 3))
-        matrices: list[Array] = []
-        for index, name in enumerate(STEP_NAMES):
-            table, anchor = steps[name], f"[steps.{name}]"
-            if not isinstance(table, dict):
-                raise self.fail(f"step {name} must be a table [steps.{name}]", name)
-            extra = sorted(set(table) - _KNOWN_STEP_KEYS)
-            if extra:
-                raise self.fail(
-                    f"unknown key '{extra[0]}' in step {name}; "
-                    f"known are {', '.join(sorted(_KNOWN_STEP_KEYS))}",
-                    anchor,
-                    extra[0],
-                )
-            for column, key in enumerate(ANGLE_NAMES):
-                if key not in table:
-                    raise self.fail(f"step {name} lacks '{key}'", anchor)
-                ground[index, column] = factor * self.number(table, key, anchor)
-            if "stiffness" in table:
-                matrices.append(self.matrix(table["stiffness"], name, anchor))
-        if not matrices:
-            return ground, None
-        if len(matrices) < 16:
-            lacking = [name for name in STEP_NAMES if "stiffness" not in steps[name]]
-            raise self.fail(
-                f"step {lacking[0]} has no stiffness although others have; "
-                "give it for all 16 steps or for none",
-                f"[steps.{lacking[0]}]",
-            )
-        return ground, np.array(matrices)
-
-    def matrix(self, value: Any, name: str, anchor: str) -> Array:
-        try:
-            matrix = np.array(value, dtype=float)
-        except (TypeError, ValueError):
-            matrix = np.empty(0)
-        if matrix.shape != (3, 3) or not np.all(np.isfinite(matrix)):
-            raise self.fail(
-                f"stiffness of step {name} must be 3 rows of 3 numbers", anchor, "stiffness"
-            )
-        if not np.allclose(matrix, matrix.T, rtol=1e-12, atol=0.0):
-            raise self.fail(f"stiffness of step {name} is not symmetric", anchor, "stiffness")
-        if np.linalg.eigvalsh(matrix)[0] <= 0.0:
-            raise self.fail(
-                f"stiffness of step {name} is not positive definite", anchor, "stiffness"
-            )
-        return matrix
+    ``read`` gives the partner's letters; anything but the reverse complement is a mistake that
+    people make.
+    """
+    names = step_names(len(ground))
+    order = [names.index(read(name)) for name in names]
+    signs = STRAND_SIGNS[kind]
+    image = None if stiffness is None else stiffness[order] * np.outer(signs, signs)
+    return ground[order] * signs, image
 
 
-def _departures(ground: Array, stiffness: Array | None) -> Array:
-    """Departure of each step from the strand relation, shape (16,)."""
-    other = list(_COMPLEMENT_STEP)
-    departure = np.abs(ground - ground[other] * _STRAND_SIGNS).max(axis=1)
-    if stiffness is not None:
-        image = stiffness[other] * np.outer(_STRAND_SIGNS, _STRAND_SIGNS)
-        relative = np.abs(stiffness - image).max(axis=(1, 2)) / np.abs(stiffness).max(axis=(1, 2))
-        departure = np.maximum(departure, relative)
+def strand_departures(
+    kind: StepKind,
+    ground: Array,
+    stiffness: Array | None,
+    read: Callable[[str], str] = reverse_complement,
+) -> Array:
+    """Departure of each step from the strand relation, shape (K,): radians or Å, or relative."""
+    image, turned = other_strand(kind, ground, stiffness, read)
+    departure = np.abs(ground - image).max(axis=1)
+    if stiffness is not None and turned is not None:
+        size = np.sqrt(np.einsum("kii,kjj->kij", stiffness, stiffness))
+        departure = np.maximum(departure, (np.abs(stiffness - turned) / size).max(axis=(1, 2)))
     return np.asarray(departure)
 
 
-def _worst_step(ground: Array, stiffness: Array | None) -> int:
-    return int(np.argmax(_departures(ground, stiffness)))
-
-
-def strand_asymmetry(ground: Array, stiffness: Array | None) -> float:
-    """Largest departure from the strand relation over the 16 steps.
-
-    Reading the other strand, a step becomes its reverse complement: tau and theta stay, phi
-    changes sign (Table I), and so do the stiffness couplings of phi.
-    """
-    return float(_departures(ground, stiffness).max())
+def strand_report(
+    kind: StepKind, ground: Array, stiffness: Array | None
+) -> tuple[float, tuple[str, ...], tuple[str, ...]]:
+    """Largest departure from the strand relation, the steps that break it, and those unreversed."""
+    names = step_names(len(ground))
+    departures = strand_departures(kind, ground, stiffness)
+    wrong = strand_departures(kind, ground, stiffness, complement)
+    broken = tuple(n for n, d in zip(names, departures, strict=True) if d > SYMMETRY_TOLERANCE)
+    # Of a step and its reverse complement the first in the alphabet is the one that tables print.
+    unreversed = tuple(
+        name
+        for name in broken
+        if wrong[names.index(name)] <= SYMMETRY_TOLERANCE and name > reverse_complement(name)
+    )
+    return float(departures.max()), broken, unreversed

@@ -44,6 +44,11 @@ class Sequence:
         return (4 * index + np.roll(index, -1)).astype(np.intp)
 
 
+def complement(letters: str) -> str:
+    """Letters that pair with the given ones, in the same order: the other strand 3' to 5'."""
+    return letters.translate(_COMPLEMENT)
+
+
 def reverse_complement(letters: str) -> str:
     """Letters of the other strand, 5' to 3'."""
     return letters.translate(_COMPLEMENT)[::-1]

@@ -161,6 +161,38 @@ def polygon_writhe(points: Any) -> float:
     return total / (2.0 * math.pi)
 
 
+@njit(cache=True, nogil=True, error_model="numpy")
+def edge_frames(centres: Any, frames: Any, out: Any) -> None:
+    """Frames along the edges of a closed polygon, d1 as near as may be to the given one.
+
+    ``out`` (N+1, 3, 3) has d3 along the edge from centre i to centre i+1 and d1 of frame i turned
+    into the plane across it. With them the twist about the polygon and its link are defined also
+    where the centres do not lie along d3, as long as d1 never points along the curve.
+    """
+    n = frames.shape[0] - 1
+    d1 = np.empty(3)
+    t = np.empty(3)
+    for s in range(n):
+        size, along = 0.0, 0.0
+        for i in range(3):
+            t[i] = centres[s + 1, i] - centres[s, i]
+            size += t[i] * t[i]
+        for i in range(3):
+            t[i] /= math.sqrt(size)
+            along += t[i] * frames[s, i, 0]
+        size = 0.0
+        for i in range(3):
+            d1[i] = frames[s, i, 0] - along * t[i]
+            size += d1[i] * d1[i]
+        for i in range(3):
+            d1[i] /= math.sqrt(size)
+            out[s, i, 0], out[s, i, 2] = d1[i], t[i]
+        out[s, 0, 1] = t[1] * d1[2] - t[2] * d1[1]
+        out[s, 1, 1] = t[2] * d1[0] - t[0] * d1[2]
+        out[s, 2, 1] = t[0] * d1[1] - t[1] * d1[0]
+    out[n] = out[0]
+
+
 @njit(cache=True, nogil=True)
 def link_of_ring(centres: Any, frames: Any) -> tuple[int, float, float]:
     """Link (integer), twist and writhe in turns of a closed ring.

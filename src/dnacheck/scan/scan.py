@@ -30,7 +30,7 @@ from dnacheck.cyclization.laplace.isolated import log_prefactor
 from dnacheck.equilibria.discrete.search import candidate_links
 from dnacheck.io.files import atomic_write
 from dnacheck.model.chain import build_chain
-from dnacheck.model.parameters import AngleSet, load_angle_set
+from dnacheck.model.parameters import ParameterSet, load_parameters
 from dnacheck.model.sequence import parse_sequence
 from dnacheck.numerics.outcome import InputError
 from dnacheck.scan import kernels as sk
@@ -200,7 +200,7 @@ def _settings(
         if key != "angles"
     }
     table = arguments.get("angles", "trifonov2")
-    table = load_angle_set(table) if isinstance(table, str) else table
+    table = load_parameters(table) if isinstance(table, str) else table
     return {
         "version": __version__,
         "input": source.name,
@@ -212,7 +212,7 @@ def _settings(
     }
 
 
-def _angle_digest(table: AngleSet) -> str:
+def _angle_digest(table: ParameterSet) -> str:
     digest = hashlib.sha256(np.ascontiguousarray(table.ground).tobytes())
     if table.stiffness is not None:
         digest.update(np.ascontiguousarray(table.stiffness).tobytes())
@@ -322,7 +322,7 @@ def scan(
     arguments = dict(options.chain_arguments)
     settings = _settings(source, records, digest, arguments)
     angles = arguments.get("angles", "trifonov2")
-    arguments["angles"] = load_angle_set(angles) if isinstance(angles, str) else angles
+    arguments["angles"] = load_parameters(angles) if isinstance(angles, str) else angles
     handle, resumed = _opened(source, output, settings, restart)
     failed = 0
     done = resumed

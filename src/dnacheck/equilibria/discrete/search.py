@@ -24,6 +24,8 @@ registers beyond it are not searched by ``auto``."""
 _MOST_MINIMA = 64
 _ALL_LINKS_REACH = 2
 _ALL_REGISTERS = 8
+# Rings of rigid steps start from 0 and half a turn, and from these.
+_RIGID_REGISTERS = np.array([0.5 * math.pi, 1.5 * math.pi])
 
 
 @dataclass(frozen=True)
@@ -88,8 +90,14 @@ class RingSearch:
 def candidate_links(chain: Chain) -> tuple[int, ...]:
     """Links that ``auto`` searches, nearest to the ground twist first."""
     turns = chain.relaxed_turns
-    twist = 1.0 / float(np.mean(1.0 / chain.stiffness[:, 0, 0]))
-    bend = 0.5 * float(np.mean(chain.stiffness[:, 1, 1] + chain.stiffness[:, 2, 2]))
+    if chain.rigid:
+        # What is left of a step's stiffness when the rest of it relaxes.
+        softness = np.linalg.inv(chain.stiffness).mean(axis=0)
+        twist = 1.0 / float(softness[0, 0])
+        bend = 2.0 / float(softness[1, 1] + softness[2, 2])
+    else:
+        twist = 1.0 / float(np.mean(1.0 / chain.stiffness[:, 0, 0]))
+        bend = 0.5 * float(np.mean(chain.stiffness[:, 1, 1] + chain.stiffness[:, 2, 2]))
     allowed = max(_WINDOW_RT / chain.energy_scale_RT, math.pi**2 * bend / chain.n_steps)
     reach = math.sqrt(2.0 * allowed * chain.n_steps / twist) / (2.0 * math.pi)
     low, high = math.floor(turns - reach), math.ceil(turns + reach)
@@ -113,6 +121,8 @@ def find_rings(chain: Chain, options: SearchOptions | None = None) -> RingSearch
         links: tuple[int, ...] = candidate_links(chain)
         registers: NDArray[Any] = np.empty(0)
         window = 0.0
+        if chain.rigid:
+            registers, window = _RIGID_REGISTERS, _WINDOW_RT / chain.energy_scale_RT
     elif options.links == "all":
         nearest = round(chain.relaxed_turns)
         around = range(nearest - _ALL_LINKS_REACH, nearest + _ALL_LINKS_REACH + 1)
@@ -140,8 +150,7 @@ def search_minima(
     in radians from the best of these.
     """
     most = min(_MOST_MINIMA, len(links) * (2 + len(registers)))
-    n = chain.n_steps
-    angles = np.empty((most, n, 3))
+    angles = np.empty((most, *chain.ground.shape))
     multipliers = np.empty((most, 6))
     figures = np.empty((most, nk.N_FIGURES))
     began = time.perf_counter()

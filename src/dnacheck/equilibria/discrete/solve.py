@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from dnacheck.equilibria.discrete.kernels import newton as nk
 from dnacheck.equilibria.discrete.spectrum import smallest_projected_eigenvalue
 from dnacheck.model.chain import Chain, chain_frames, energy_parts
-from dnacheck.numerics.curve_topology import link_of_ring
+from dnacheck.numerics.curve_topology import edge_frames, link_of_ring
 from dnacheck.numerics.outcome import InputError, SolveError, Status
 
 Array = NDArray[np.float64]
@@ -76,8 +76,8 @@ class DiscreteRing:
     ----------
     chain : Chain
         The molecule.
-    angles : ndarray, shape (N, 3)
-        tau, theta, phi of each step in radians; read-only.
+    angles : ndarray, shape (N, c)
+        Coordinates of each step: tau, theta, phi in radians, or the six of a rigid step; read-only.
     multipliers : ndarray, shape (6,)
         Force (reduced energy per step length) and moment (reduced energy per radian) of closure,
         in the frame of the first base pair: gradient + (closure Jacobian)^T multipliers = 0.
@@ -160,13 +160,25 @@ class DiscreteRing:
         return smallest_projected_eigenvalue(self.chain, self.angles, self.multipliers)
 
 
+def _topology(chain: Chain, centres: Array, frames: Array) -> tuple[int, float, float]:
+    """Link, twist and writhe in turns; of rigid steps, about the edges between their centres."""
+    if chain.rigid:
+        along = np.empty_like(frames)
+        edge_frames(centres, frames, along)
+        frames = along
+    link, twist, writhe = link_of_ring(centres, frames)
+    return int(link), float(twist), float(writhe)
+
+
 def make_ring(
     chain: Chain, angles: Array, multipliers: Array, figures: Array, code: int, seconds: float
 ) -> DiscreteRing:
     """Wrap what the compiled solver left into a :class:`DiscreteRing`."""
     centres, frames = chain_frames(angles, chain.step_form)
     converged = code == nk.CONVERGED
-    link, twist, writhe = link_of_ring(centres, frames) if np.isfinite(centres).all() else (0, 0, 0)
+    link, twist, writhe = (
+        _topology(chain, centres, frames) if np.isfinite(centres).all() else (0, 0.0, 0.0)
+    )
     negatives = int(figures[nk.NEGATIVES])
     neutral = converged and figures[nk.NEUTRAL] > 0.0
     status = _STATUS[code]
@@ -181,9 +193,9 @@ def make_ring(
         angles=angles,
         multipliers=multipliers,
         energy=float(figures[nk.ENERGY]),
-        link=int(link),
-        twist=float(twist),
-        writhe=float(writhe),
+        link=link,
+        twist=twist,
+        writhe=writhe,
         stable=negatives == 0 if converged and (negatives or not neutral) else None,
         negative_eigenvalues=negatives,
         log_abs_det_kkt=float(figures[nk.LOG_DET_KKT]),
@@ -206,8 +218,8 @@ def solve_ring(
 
     Parameters
     ----------
-    start : array_like, shape (N, 3)
-        Angles in radians; need not be closed.
+    start : array_like, shape (N, c)
+        Coordinates of the steps; need not be closed.
     throw : bool
         Whether to raise when the search does not converge; otherwise the status tells.
 

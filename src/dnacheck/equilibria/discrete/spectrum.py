@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dnacheck.equilibria.discrete.kernels.closure import energy_gradient, linearise
-from dnacheck.equilibria.discrete.kernels.factorisation import (
-    FACTOR_WIDTH,
-    back_substitute,
-    eliminate,
-    factorise,
+from dnacheck.equilibria.discrete.kernels.states import (
+    evaluate,
+    factorise_state,
+    new_factors,
+    new_state,
+    replace_rhs,
+    substitute,
 )
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.small_systems import solve_small
@@ -24,59 +25,48 @@ _LANCZOS_TOLERANCE = 1e-9
 class ProjectedInverse:
     """The inverse of the projected Hessian at a point of a chain, applied in linear time.
 
-    For a vector x (N, 3) it gives Z (Z^T H Z)^-1 Z^T x, where Z spans the changes that keep the
+    For a vector x (N, c) it gives Z (Z^T H Z)^-1 Z^T x, where Z spans the changes that keep the
     chain closed to first order.
     """
 
     def __init__(self, chain: Chain, angles: Array, multipliers: Array) -> None:
-        n, steps = chain.n_steps, chain.arrays
+        steps = chain.arrays
         # Copies: a ring's own arrays are read-only, for which kernels would be compiled anew.
-        angles, multipliers = np.array(angles), np.array(multipliers)
-        centres, frames = np.empty((n + 1, 3)), np.empty((n + 1, 3, 3))
-        axes, gradient = np.empty((n, 3, 3)), np.empty((n, 3))
-        halves = np.empty((n if chain.form_code else 0, 5, 3))
-        form = chain.form_code
-        linearise(angles, form, centres, frames, axes, halves)
-        energy_gradient(angles, steps.ground, steps.stiffness, gradient)
-        self.length = float(n)
-        self.factors = np.empty((n, FACTOR_WIDTH))
+        multipliers = np.array(multipliers)
+        self.state = new_state(steps)
+        self.state.angles[:] = angles
+        evaluate(self.state, steps)
+        self.length = float(chain.n_steps)
+        self.factors = new_factors(steps)
         self.small = np.empty((6, 7))
-        factorise(
-            gradient,
-            steps.stiffness,
-            0.0,
-            form,
-            centres,
-            axes,
-            halves,
-            multipliers,
-            self.factors,
-            self.small,
+        factorise_state(
+            self.state, steps, 0.0, multipliers, self.factors, self.small, self.state.gradient
         )
 
     def __call__(self, x: Array) -> Array:
-        """Apply to ``x`` (N, 3)."""
-        eliminate(self.factors, x, self.small)
+        """Apply to ``x`` (N, c)."""
+        replace_rhs(self.state, self.factors, x, self.small)
         multipliers = np.empty(6)
         solve_small(self.small, -self.small[:, 6], self.length, multipliers)
         step = np.empty_like(x)
-        back_substitute(self.factors, multipliers, 1.0, step)
+        substitute(self.state, self.factors, multipliers, 1.0, step)
         return -step
 
 
 def smallest_projected_eigenvalue(chain: Chain, angles: Array, multipliers: Array) -> float:
     """Algebraically smallest eigenvalue of the projected Hessian, by Lanczos on its inverse.
 
-    In reduced energy per square radian, for the Euclidean metric of the 3N angles.
+    In reduced energy per square radian, for the Euclidean metric of the 3N angles; of rigid steps,
+    for that of their 6N coordinates in radians and units of length.
     """
     inverse = ProjectedInverse(chain, angles, multipliers)
     rng = np.random.default_rng(0)
-    basis = [inverse(rng.standard_normal((chain.n_steps, 3)))]
+    basis = [inverse(rng.standard_normal(chain.ground.shape))]
     basis[0] /= np.linalg.norm(basis[0])
     diagonal: list[float] = []
     off: list[float] = []
     previous = np.inf
-    for _ in range(min(_LANCZOS_STEPS, 3 * chain.n_steps - 6)):
+    for _ in range(min(_LANCZOS_STEPS, chain.ground.size - 6)):
         w = inverse(basis[-1])
         diagonal.append(float(np.sum(w * basis[-1])))
         for v in basis:

@@ -183,6 +183,7 @@ def build_rod(chain: Chain, options: RodOptions | None = None) -> Rod:
         stiffness that a transversely isotropic rod can't represent.
     """
     options = RodOptions() if options is None else options
+    chain.require_hinges("the continuum rod")
     n = chain.n_steps
     padded = chain.ground[padded_steps(n, options.padding)]
     centres, frames = chain_frames(padded, chain.step_form)

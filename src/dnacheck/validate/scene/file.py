@@ -13,8 +13,9 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
+from dnacheck.model.data_files import PARAMETER_SETS
 from dnacheck.model.molecules import Molecule, embedded, embedded_names, read_fasta
-from dnacheck.model.parameters import EMBEDDED_SETS, load_angle_set
+from dnacheck.model.parameters import load_parameters
 from dnacheck.model.sequence import parse_sequence
 from dnacheck.numerics.outcome import InputError
 from dnacheck.validate.scene.line_numbers import line_numbers, line_of
@@ -124,11 +125,11 @@ class _Reader:
         """The parameter files that the scene names, each read once to see that it is one."""
         files = []
         for index, name in enumerate(scene.model.angles):
-            if name in EMBEDDED_SETS:
+            if name in PARAMETER_SETS:
                 continue
             path = self._beside(name).resolve()
             try:
-                table = load_angle_set(str(path))
+                table = load_parameters(str(path))
             except InputError as error:
                 raise self.fail(str(error), "model", "angles", index) from None
             has_stiffness = table.stiffness is not None

@@ -18,6 +18,7 @@ import numpy as np
 from numba import njit
 
 from dnacheck.model.chain_kernels import WEDGE
+from dnacheck.numerics.vectors import combine, cross, dot, less_product, plus
 
 FACTOR_WIDTH = 36
 """Numbers kept per step: E (9), Z = D^-1 U (9), eliminated displacement columns W (9), eliminated
@@ -28,49 +29,10 @@ _Z, _W, _G, _D = 9, 18, 27, 30
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
-def _cross(a: Any, b: Any) -> Any:
-    return (
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    )
-
-
-@njit(cache=True, nogil=True, fastmath={"contract"})
-def _dot(a: Any, b: Any) -> Any:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@njit(cache=True, nogil=True, fastmath={"contract"})
 def _couple(a: Any, b: Any, force: Any, half: Any, held: float) -> Any:
     """e = b x force + a x moment/2 + held a."""
-    c, d = _cross(b, force), _cross(a, half)
+    c, d = cross(b, force), cross(a, half)
     return c[0] + d[0] + held * a[0], c[1] + d[1] + held * a[1], c[2] + d[2] + held * a[2]
-
-
-@njit(cache=True, nogil=True, fastmath={"contract"})
-def _less_product(a: Any, e: Any, m: Any) -> Any:
-    """a - e m for row vectors a, e and a matrix m given by its rows."""
-    return (
-        a[0] - (e[0] * m[0][0] + e[1] * m[1][0] + e[2] * m[2][0]),
-        a[1] - (e[0] * m[0][1] + e[1] * m[1][1] + e[2] * m[2][1]),
-        a[2] - (e[0] * m[0][2] + e[1] * m[1][2] + e[2] * m[2][2]),
-    )
-
-
-@njit(cache=True, nogil=True, fastmath={"contract"})
-def _combine(c: Any, r0: Any, r1: Any, r2: Any) -> Any:
-    """c0 r0 + c1 r1 + c2 r2 for row vectors."""
-    return (
-        c[0] * r0[0] + c[1] * r1[0] + c[2] * r2[0],
-        c[0] * r0[1] + c[1] * r1[1] + c[2] * r2[1],
-        c[0] * r0[2] + c[1] * r1[2] + c[2] * r2[2],
-    )
-
-
-@njit(cache=True, nogil=True, fastmath={"contract"})
-def _plus(a: Any, b: Any) -> Any:
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
@@ -166,29 +128,29 @@ def factorise(
         held = shift * (n - s) / n
         d = (end[0] - centres[s + 1, 0], end[1] - centres[s + 1, 1], end[2] - centres[s + 1, 2])
         a0, a1, a2 = _vector(axes, s, 0), _vector(axes, s, 1), _vector(axes, s, 2)
-        b0, b1, b2 = _cross(a0, d), _cross(a1, d), _cross(a2, d)
+        b0, b1, b2 = cross(a0, d), cross(a1, d), cross(a2, d)
         e0 = _couple(a0, b0, force, half, held)
         e1 = _couple(a1, b1, force, half, held)
         e2 = _couple(a2, b2, force, half, held)
         p, q = (p0, p1, p2), (q0, q1, q2)
-        u0, u1, u2 = _less_product(a0, e0, p), _less_product(a1, e1, p), _less_product(a2, e2, p)
-        w0, w1, w2 = _less_product(b0, e0, q), _less_product(b1, e1, q), _less_product(b2, e2, q)
+        u0, u1, u2 = less_product(a0, e0, p), less_product(a1, e1, p), less_product(a2, e2, p)
+        w0, w1, w2 = less_product(b0, e0, q), less_product(b1, e1, q), less_product(b2, e2, q)
         g = (
-            gradient[s, 0] - _dot(e0, r),
-            gradient[s, 1] - _dot(e1, r),
-            gradient[s, 2] - _dot(e2, r),
+            gradient[s, 0] - dot(e0, r),
+            gradient[s, 1] - dot(e1, r),
+            gradient[s, 2] - dot(e2, r),
         )
         # The block within a step is a_j . e_k for j <= k, so that with -e_j P e_k it is u_j . e_k.
-        d00, d10, d11 = _dot(u0, e0), _dot(u0, e1), _dot(u1, e1)
-        d20, d21, d22 = _dot(u0, e2), _dot(u1, e2), _dot(u2, e2)
+        d00, d10, d11 = dot(u0, e0), dot(u0, e1), dot(u1, e1)
+        d20, d21, d22 = dot(u0, e2), dot(u1, e2), dot(u2, e2)
         if form != WEDGE:
             midstep_block(halves[s], d[0], d[1], d[2], multipliers, block)
-            d00 += block[0, 0] + held * _dot(a0, a0) - _dot(a0, e0)
-            d10 += block[1, 0] + held * _dot(a0, a1) - _dot(a0, e1)
-            d11 += block[1, 1] + held * _dot(a1, a1) - _dot(a1, e1)
-            d20 += block[2, 0] + held * _dot(a0, a2) - _dot(a0, e2)
-            d21 += block[2, 1] + held * _dot(a1, a2) - _dot(a1, e2)
-            d22 += block[2, 2] + held * _dot(a2, a2) - _dot(a2, e2)
+            d00 += block[0, 0] + held * dot(a0, a0) - dot(a0, e0)
+            d10 += block[1, 0] + held * dot(a0, a1) - dot(a0, e1)
+            d11 += block[1, 1] + held * dot(a1, a1) - dot(a1, e1)
+            d20 += block[2, 0] + held * dot(a0, a2) - dot(a0, e2)
+            d21 += block[2, 1] + held * dot(a1, a2) - dot(a1, e2)
+            d22 += block[2, 2] + held * dot(a2, a2) - dot(a2, e2)
         d00 += stiffness[s, 0, 0]
         d10 += stiffness[s, 1, 0]
         d11 += stiffness[s, 1, 1]
@@ -215,19 +177,19 @@ def factorise(
         i0 = (f * c0, f * c1, f * c2)
         i1 = (i0[1], f * (d00 * d22 - d20 * d20), f * (d10 * d20 - d00 * d21))
         i2 = (i0[2], i1[2], f * minor)
-        z0, z1, z2 = _combine(i0, u0, u1, u2), _combine(i1, u0, u1, u2), _combine(i2, u0, u1, u2)
-        p0 = _plus(p0, _combine((u0[0], u1[0], u2[0]), z0, z1, z2))
-        p1 = _plus(p1, _combine((u0[1], u1[1], u2[1]), z0, z1, z2))
-        p2 = _plus(p2, _combine((u0[2], u1[2], u2[2]), z0, z1, z2))
-        q0 = _plus(q0, _combine((z0[0], z1[0], z2[0]), w0, w1, w2))
-        q1 = _plus(q1, _combine((z0[1], z1[1], z2[1]), w0, w1, w2))
-        q2 = _plus(q2, _combine((z0[2], z1[2], z2[2]), w0, w1, w2))
-        r = _plus(r, _combine(g, z0, z1, z2))
-        y0, y1, y2 = _combine(i0, w0, w1, w2), _combine(i1, w0, w1, w2), _combine(i2, w0, w1, w2)
-        t0 = _plus(t0, _combine((w0[0], w1[0], w2[0]), y0, y1, y2))
-        t1 = _plus(t1, _combine((w0[1], w1[1], w2[1]), y0, y1, y2))
-        t2 = _plus(t2, _combine((w0[2], w1[2], w2[2]), y0, y1, y2))
-        v = _plus(v, _combine(g, y0, y1, y2))
+        z0, z1, z2 = combine(i0, u0, u1, u2), combine(i1, u0, u1, u2), combine(i2, u0, u1, u2)
+        p0 = plus(p0, combine((u0[0], u1[0], u2[0]), z0, z1, z2))
+        p1 = plus(p1, combine((u0[1], u1[1], u2[1]), z0, z1, z2))
+        p2 = plus(p2, combine((u0[2], u1[2], u2[2]), z0, z1, z2))
+        q0 = plus(q0, combine((z0[0], z1[0], z2[0]), w0, w1, w2))
+        q1 = plus(q1, combine((z0[1], z1[1], z2[1]), w0, w1, w2))
+        q2 = plus(q2, combine((z0[2], z1[2], z2[2]), w0, w1, w2))
+        r = plus(r, combine(g, z0, z1, z2))
+        y0, y1, y2 = combine(i0, w0, w1, w2), combine(i1, w0, w1, w2), combine(i2, w0, w1, w2)
+        t0 = plus(t0, combine((w0[0], w1[0], w2[0]), y0, y1, y2))
+        t1 = plus(t1, combine((w0[1], w1[1], w2[1]), y0, y1, y2))
+        t2 = plus(t2, combine((w0[2], w1[2], w2[2]), y0, y1, y2))
+        v = plus(v, combine(g, y0, y1, y2))
         _store(factors, s, 0, e0)
         _store(factors, s, 3, e1)
         _store(factors, s, 6, e2)
@@ -266,7 +228,7 @@ def _divide_by_pivot(factors: Any, s: int, x: Any) -> Any:
     """D^-1 x of one step."""
     i00, i10, i11 = _row(factors, s, _D)
     i20, i21, i22 = _row(factors, s, _D + 3)
-    return _dot((i00, i10, i20), x), _dot((i10, i11, i21), x), _dot((i20, i21, i22), x)
+    return dot((i00, i10, i20), x), dot((i10, i11, i21), x), dot((i20, i21, i22), x)
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
@@ -279,19 +241,19 @@ def back_substitute(factors: Any, new_multipliers: Any, weight: float, step: Any
         s = n - 1 - back
         g = _row(factors, s, _G)
         x = (
-            weight * g[0] + _dot(_row(factors, s, _W), m),
-            weight * g[1] + _dot(_row(factors, s, _W + 3), m),
-            weight * g[2] + _dot(_row(factors, s, _W + 6), m),
+            weight * g[0] + dot(_row(factors, s, _W), m),
+            weight * g[1] + dot(_row(factors, s, _W + 3), m),
+            weight * g[2] + dot(_row(factors, s, _W + 6), m),
         )
         x = _divide_by_pivot(factors, s, x)
         y = (
-            -x[0] - _dot(_row(factors, s, _Z), t),
-            -x[1] - _dot(_row(factors, s, _Z + 3), t),
-            -x[2] - _dot(_row(factors, s, _Z + 6), t),
+            -x[0] - dot(_row(factors, s, _Z), t),
+            -x[1] - dot(_row(factors, s, _Z + 3), t),
+            -x[2] - dot(_row(factors, s, _Z + 6), t),
         )
         _store(step, s, 0, y)
-        et = _combine(y, _row(factors, s, 0), _row(factors, s, 3), _row(factors, s, 6))
-        t = _plus(t, et)
+        et = combine(y, _row(factors, s, 0), _row(factors, s, 3), _row(factors, s, 6))
+        t = plus(t, et)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
@@ -301,15 +263,15 @@ def eliminate(factors: Any, rhs: Any, small: Any) -> None:
     v = (0.0, 0.0, 0.0)
     for s in range(factors.shape[0]):
         g = (
-            rhs[s, 0] - _dot(_row(factors, s, 0), r),
-            rhs[s, 1] - _dot(_row(factors, s, 3), r),
-            rhs[s, 2] - _dot(_row(factors, s, 6), r),
+            rhs[s, 0] - dot(_row(factors, s, 0), r),
+            rhs[s, 1] - dot(_row(factors, s, 3), r),
+            rhs[s, 2] - dot(_row(factors, s, 6), r),
         )
         _store(factors, s, _G, g)
         y = _divide_by_pivot(factors, s, g)
         z0, z1, z2 = _row(factors, s, _Z), _row(factors, s, _Z + 3), _row(factors, s, _Z + 6)
         w0, w1, w2 = _row(factors, s, _W), _row(factors, s, _W + 3), _row(factors, s, _W + 6)
-        r = _plus(r, _combine(g, z0, z1, z2))
-        v = _plus(v, _combine(y, w0, w1, w2))
+        r = plus(r, combine(g, z0, z1, z2))
+        v = plus(v, combine(y, w0, w1, w2))
     for i in range(3):
         small[i, 6], small[3 + i, 6] = v[i], r[i]

@@ -8,8 +8,12 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from dnacheck.equilibria.discrete.kernels.factorisation import back_substitute, eliminate, factorise
-from dnacheck.equilibria.discrete.kernels.moves import accumulated_turn
+from dnacheck.equilibria.discrete.kernels.states import (
+    accumulated_turn,
+    factorise_state,
+    replace_rhs,
+    substitute,
+)
 from dnacheck.numerics.small_systems import solve_small
 
 # First shift tried, relative to the energy of a bent circle.
@@ -21,9 +25,8 @@ _INVERSE_ITERATIONS = 6
 @njit(cache=True, nogil=True)
 def solve_kkt(
     state: Any,
-    stiffness: Any,
+    steps: Any,
     shift: float,
-    form: int,
     multipliers: Any,
     factors: Any,
     small: Any,
@@ -32,7 +35,7 @@ def solve_kkt(
 ) -> tuple[int, float, float]:
     """Factorise the KKT matrix with a shift and solve for the ``change`` (6,) of the multipliers.
 
-    The right-hand side is ``slope`` (N, 3), the gradient of the Lagrangian. Solving for changes
+    The right-hand side is ``slope`` (N, c), the gradient of the Lagrangian. Solving for changes
     keeps the error relative to them where a pivot of H happens to be tiny; the multipliers
     themselves would carry it into every iteration.
 
@@ -42,14 +45,13 @@ def solve_kkt(
     log_det : log |det KKT|, minus infinity if it is singular.
     weakest : see :func:`dnacheck.equilibria.discrete.kernels.factorisation.factorise`.
     """
-    _, centres, _, axes, halves, _, closure = state
-    pivots, log_pivots, weakest = factorise(
-        slope, stiffness, shift, form, centres, axes, halves, multipliers, factors, small
+    pivots, log_pivots, weakest = factorise_state(
+        state, steps, shift, multipliers, factors, small, slope
     )
     rhs = np.empty(6)
     for i in range(6):
-        rhs[i] = closure[i] - small[i, 6]
-    small_negatives, log_small = solve_small(small, rhs, float(axes.shape[0]), change)
+        rhs[i] = state.closure[i] - small[i, 6]
+    small_negatives, log_small = solve_small(small, rhs, float(slope.shape[0]), change)
     # The inertia of the KKT matrix is that of H and of minus the Schur complement.
     if small_negatives < 0:
         return -1, -math.inf, weakest
@@ -57,28 +59,27 @@ def solve_kkt(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def least_stable(axes: Any, factors: Any, small: Any, direction: Any) -> bool:
-    """Direction (N, 3) of least curvature, from the factors of a Hessian shifted to be positive.
+def least_stable(state: Any, factors: Any, small: Any, direction: Any) -> bool:
+    """Direction (N, c) of least curvature, from the factors of a Hessian shifted to be positive.
 
-    ``axes`` are those of :func:`dnacheck.equilibria.discrete.kernels.closure.linearise`. A few
-    steps of inverse iteration, scaled so that no frame turns by more than a radian. False if that
-    fails.
+    A few steps of inverse iteration, scaled so that no frame turns by more than a radian. False if
+    that fails.
     """
-    n = axes.shape[0]
+    n, c = direction.shape
     target = np.empty(6)
     for s in range(n):
-        for j in range(3):
+        for j in range(c):
             # Any vector serves that no symmetry of the chain makes orthogonal to the answer.
             direction[s, j] = math.sin(1.0 + 3.7 * s + 1.3 * j * j)
     turn = 1.0
     for _ in range(_INVERSE_ITERATIONS):
-        eliminate(factors, direction, small)
+        replace_rhs(state, factors, direction, small)
         if solve_small(small, -small[:, 6], float(n), target)[0] < 0:
             return False
-        back_substitute(factors, target, 1.0, direction)
-        turn = accumulated_turn(axes, direction)
+        substitute(state, factors, target, 1.0, direction)
+        turn = accumulated_turn(state, direction)
         for s in range(n):
-            for j in range(3):
+            for j in range(c):
                 direction[s, j] /= turn
     return math.isfinite(turn)
 
@@ -86,10 +87,9 @@ def least_stable(axes: Any, factors: Any, small: Any, direction: Any) -> bool:
 @njit(cache=True, nogil=True)
 def positive_shift(
     state: Any,
-    stiffness: Any,
+    steps: Any,
     start: float,
     unit: float,
-    form: int,
     multipliers: Any,
     factors: Any,
     small: Any,
@@ -99,9 +99,7 @@ def positive_shift(
     """Smallest shift tried, from ``start`` on, that makes the projected Hessian positive; or -1."""
     shift = start
     for _ in range(MOST_SHIFTS):
-        negatives, _, _ = solve_kkt(
-            state, stiffness, shift, form, multipliers, factors, small, slope, change
-        )
+        negatives, _, _ = solve_kkt(state, steps, shift, multipliers, factors, small, slope, change)
         if negatives == 0:
             return shift
         shift = max(FIRST_SHIFT * unit, 4.0 * shift)

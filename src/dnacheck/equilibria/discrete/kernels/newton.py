@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from dnacheck.equilibria.discrete.kernels.factorisation import FACTOR_WIDTH, back_substitute
 from dnacheck.equilibria.discrete.kernels.kkt import (
     FIRST_SHIFT,
     MOST_SHIFTS,
@@ -16,15 +15,14 @@ from dnacheck.equilibria.discrete.kernels.kkt import (
     positive_shift,
     solve_kkt,
 )
-from dnacheck.equilibria.discrete.kernels.moves import (
+from dnacheck.equilibria.discrete.kernels.moves import line_search, move, residuals
+from dnacheck.equilibria.discrete.kernels.states import (
     accumulated_turn,
     evaluate,
-    line_search,
-    move,
+    new_factors,
     new_state,
-    residuals,
+    substitute,
 )
-from dnacheck.model.chain_kernels import HingeSteps
 
 CONVERGED = 0
 ITERATION_LIMIT = 1
@@ -60,9 +58,8 @@ _ESCAPE_TURN = 0.3
 @njit(cache=True, nogil=True)
 def _inspect(
     state: Any,
-    stiffness: Any,
+    steps: Any,
     flat: float,
-    form: int,
     multipliers: Any,
     factors: Any,
     small: Any,
@@ -74,17 +71,13 @@ def _inspect(
 
     Returns the number of eigenvalues below -flat, or -1 if even a shift by ``flat`` is singular.
     """
-    below, _, _ = solve_kkt(
-        state, stiffness, -flat, form, multipliers, factors, small, slope, change
-    )
+    below, _, _ = solve_kkt(state, steps, -flat, multipliers, factors, small, slope, change)
     negatives, log_det, weakest = solve_kkt(
-        state, stiffness, 0.0, form, multipliers, factors, small, slope, change
+        state, steps, 0.0, multipliers, factors, small, slope, change
     )
     above = negatives
     if negatives != 0:
-        above, _, _ = solve_kkt(
-            state, stiffness, flat, form, multipliers, factors, small, slope, change
-        )
+        above, _, _ = solve_kkt(state, steps, flat, multipliers, factors, small, slope, change)
     figures[NEGATIVES] = above
     figures[NEUTRAL] = below - above
     figures[LOG_DET_KKT] = log_det
@@ -96,11 +89,11 @@ def _inspect(
 def newton(
     angles: Any,
     multipliers: Any,
-    steps: HingeSteps,
+    steps: Any,
     limits: NewtonLimits,
     figures: Any,
 ) -> int:
-    """Move ``angles`` (N, 3) and ``multipliers`` (6,) to a closed equilibrium, in place.
+    """Move ``angles`` (N, c) and ``multipliers`` (6,) to a closed equilibrium, in place.
 
     Each iteration factorises the Hessian of the Lagrangian. A shift that penalises the rotation
     of frames (see :func:`factorise`) is raised until the projected Hessian is positive (only with
@@ -114,16 +107,16 @@ def newton(
     pivot and the number of eigenvalues that are zero to round-off. Every exit has a code; no loop
     is unbounded.
     """
-    ground, stiffness, form = steps.ground, steps.stiffness, steps.form
+    stiffness = steps.stiffness
     tolerance, max_iterations = limits.tolerance, limits.max_iterations
     turn_cap, minima_only = limits.turn_cap, limits.minima_only
     n = angles.shape[0]
-    state = new_state(n, form)
-    trial = new_state(n, form)
-    factors = np.empty((n, FACTOR_WIDTH))
+    state = new_state(steps)
+    trial = new_state(steps)
+    factors = new_factors(steps)
     small = np.empty((6, 7))
-    step = np.empty((n, 3))
-    slope = np.empty((n, 3))
+    step = np.empty(angles.shape)
+    slope = np.empty(angles.shape)
     change = np.empty(6)
     target = np.empty(6)
     mean_bend = 0.0
@@ -135,16 +128,14 @@ def newton(
     shift, first = 0.0, 0.0
     escapes = 0
 
-    state[0][:] = angles
-    energy = evaluate(state, ground, stiffness, form)
+    state.angles[:] = angles
+    energy = evaluate(state, steps)
     unknown = True
     for i in range(6):
         unknown = unknown and multipliers[i] == 0.0
     if unknown:
         residuals(state, multipliers, slope)
-        negatives, _, _ = solve_kkt(
-            state, stiffness, 0.0, form, multipliers, factors, small, slope, change
-        )
+        negatives, _, _ = solve_kkt(state, steps, 0.0, multipliers, factors, small, slope, change)
         if negatives >= 0:
             multipliers[:] = change
     code = ITERATION_LIMIT
@@ -159,7 +150,7 @@ def newton(
             break
         if figures[RESIDUAL] <= tolerance:
             unstable = _inspect(
-                state, stiffness, flat, form, multipliers, factors, small, slope, change, figures
+                state, steps, flat, multipliers, factors, small, slope, change, figures
             )
             code = CONVERGED if unstable >= 0 else SINGULAR
             if unstable <= 0 or not minima_only or escapes == _MOST_ESCAPES:
@@ -167,13 +158,13 @@ def newton(
             code = ITERATION_LIMIT
             escapes += 1
             shift = positive_shift(
-                state, stiffness, flat, unit, form, multipliers, factors, small, slope, change
+                state, steps, flat, unit, multipliers, factors, small, slope, change
             )
-            if shift < 0.0 or not least_stable(state[3], factors, small, step):
+            if shift < 0.0 or not least_stable(state, factors, small, step):
                 code = CONVERGED
                 break
-            move(state, step, _ESCAPE_TURN, 1.0, form, trial[0])
-            energy = evaluate(trial, ground, stiffness, form)
+            move(state, step, _ESCAPE_TURN, 1.0, trial.angles)
+            energy = evaluate(trial, steps)
             state, trial = trial, state
             continue
         if iteration == max_iterations:
@@ -184,11 +175,11 @@ def newton(
         turn = math.inf
         for attempt in range(MOST_SHIFTS):
             negatives, _, _ = solve_kkt(
-                state, stiffness, shift, form, multipliers, factors, small, slope, change
+                state, steps, shift, multipliers, factors, small, slope, change
             )
             if negatives == 0 or (negatives > 0 and not minima_only):
-                back_substitute(factors, change, 1.0, step)
-                turn = accumulated_turn(state[3], step)
+                substitute(state, factors, change, 1.0, step)
+                turn = accumulated_turn(state, step)
                 if turn <= 2.0 * turn_cap or not minima_only or attempt >= 6:
                     break
                 shift = 2.0 * (shift + first)
@@ -208,9 +199,7 @@ def newton(
             energy,
             figures[RESIDUAL],
             target,
-            ground,
-            stiffness,
-            form,
+            steps,
         )
         if fraction == 0.0:
             code = STEP_LIMIT
@@ -222,5 +211,5 @@ def newton(
         for i in range(6):
             multipliers[i] += fraction * change[i]
         state, trial = trial, state
-    angles[:] = state[0]
+    angles[:] = state.angles
     return code

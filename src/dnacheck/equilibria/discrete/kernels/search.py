@@ -17,7 +17,9 @@ from dnacheck.equilibria.discrete.kernels.newton import (
     NewtonLimits,
     newton,
 )
+from dnacheck.equilibria.discrete.kernels.rigid_starts import fill_rigid_circle, rigid_registers
 from dnacheck.equilibria.discrete.kernels.starts import circle_registers, fill_circle
+from dnacheck.equilibria.discrete.kernels.states import by_kind
 from dnacheck.model.chain_kernels import HingeSteps
 
 # Two minima are one when their energies agree to this relative precision and their angles to
@@ -27,9 +29,26 @@ _SAME_ANGLES = 1e-4
 
 
 @njit(cache=True, nogil=True)
-def best_register(steps: HingeSteps, link: int, scratch: Any) -> float:
+def _fill_hinge_start(steps: HingeSteps, link: int, register: float, angles: Any) -> None:
+    fill_circle(steps.ground, steps.form, link, register, angles)
+
+
+@njit(cache=True, nogil=True)
+def _hinge_registers(steps: HingeSteps, link: int, registers: Any) -> int:
+    return circle_registers(steps.ground, steps.stiffness, steps.form, link, registers)
+
+
+fill_start = by_kind(_fill_hinge_start, fill_rigid_circle)
+"""Angles (N, c) of a closed ring of a link and register: (steps, link, register, angles)."""
+
+start_registers = by_kind(_hinge_registers, rigid_registers)
+"""One or two registers to start from, into ``registers`` (2,): (steps, link, registers)."""
+
+
+@njit(cache=True, nogil=True)
+def best_register(steps: Any, link: int, scratch: Any) -> float:
     """Register of lowest predicted energy of the planar ring; see :func:`circle_registers`."""
-    circle_registers(steps.ground, steps.stiffness, steps.form, link, scratch[0])
+    start_registers(steps, link, scratch[0])
     return scratch[0, 0]
 
 
@@ -44,7 +63,7 @@ def _known(trial: Any, energy: float, neutral: bool, found: int, angles: Any, fi
             return True
         worst = 0.0
         for s in range(trial.shape[0]):
-            for j in range(3):
+            for j in range(trial.shape[1]):
                 worst = max(worst, abs(trial[s, j] - angles[m, s, j]))
         if worst < _SAME_ANGLES:
             return True
@@ -53,7 +72,7 @@ def _known(trial: Any, energy: float, neutral: bool, found: int, angles: Any, fi
 
 @njit(cache=True, nogil=True)
 def minimum_from_circle(
-    steps: HingeSteps,
+    steps: Any,
     link: int,
     register: float,
     limits: NewtonLimits,
@@ -63,9 +82,9 @@ def minimum_from_circle(
 ) -> bool:
     """Whether the planar ring of a link and register leads to a minimum.
 
-    It fills ``angles`` (N, 3), ``multipliers`` (6,) and ``figures`` (8,); see :func:`newton`.
+    It fills ``angles`` (N, c), ``multipliers`` (6,) and ``figures`` (8,); see :func:`newton`.
     """
-    fill_circle(steps.ground, steps.form, link, register, angles)
+    fill_start(steps, link, register, angles)
     multipliers[:] = 0.0
     figures[:] = 0.0
     code = newton(angles, multipliers, steps, limits, figures)
@@ -74,7 +93,7 @@ def minimum_from_circle(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def search(
-    steps: HingeSteps,
+    steps: Any,
     links: Any,
     registers: Any,
     window: float,
@@ -87,16 +106,15 @@ def search(
 
     Each link starts from the one or two registers where its planar ring is predicted to rest;
     links whose minimum lies within ``window`` (reduced energy) of the lowest start again from the
-    best one plus each of ``registers``. The minima fill ``angles`` (M, N, 3), ``multipliers``
+    best one plus each of ``registers``. The minima fill ``angles`` (M, N, c), ``multipliers``
     (M, 6) and ``figures`` (M, 8) in order of discovery.
 
     Returns
     -------
     found, starts, failed : how many distinct minima, starts, and starts that did not converge.
     """
-    n = steps.ground.shape[0]
     found, starts, failed = 0, 0, 0
-    trial = np.empty((n, 3))
+    trial = np.empty(steps.ground.shape)
     force = np.empty(6)
     figure = np.empty(N_FIGURES)
     rests = np.empty((links.shape[0], 2))
@@ -106,9 +124,7 @@ def search(
     for round_ in range(2 + registers.shape[0]):
         for i in range(links.shape[0]):
             if round_ == 0:
-                counts[i] = circle_registers(
-                    steps.ground, steps.stiffness, steps.form, links[i], rests[i]
-                )
+                counts[i] = start_registers(steps, links[i], rests[i])
             if round_ >= 2 and not energies[i] <= lowest + window:
                 continue
             if round_ == 1 and counts[i] < 2:

@@ -9,14 +9,10 @@ import numpy as np
 from numba import njit
 
 from dnacheck.equilibria.discrete.kernels.closure import linearise
-from dnacheck.equilibria.discrete.kernels.factorisation import (
-    FACTOR_WIDTH,
-    back_substitute,
-    eliminate,
-)
+from dnacheck.equilibria.discrete.kernels.factorisation import back_substitute, eliminate
 from dnacheck.equilibria.discrete.kernels.kkt import positive_shift
-from dnacheck.equilibria.discrete.kernels.moves import new_state
-from dnacheck.model.chain_kernels import fill_angles
+from dnacheck.equilibria.discrete.kernels.states import new_factors, new_state
+from dnacheck.model.chain_kernels import HingeSteps, fill_angles
 from dnacheck.numerics.small_systems import solve_small
 
 # Registers at which the predicted energy is sampled; it holds two harmonics.
@@ -108,15 +104,16 @@ def _roll_energy(ground: Any, stiffness: Any, form: int, link: int, quadratic: A
     leaves out the roll itself, which costs nothing to the straight molecule it starts from.
     """
     n = ground.shape[0]
-    state = new_state(n, form)
-    angles, centres, frames, axes, _, gradient, closure = state
+    mean = np.zeros((n, 3, 3))
+    mean_steps = HingeSteps(ground, mean, form)
+    state = new_state(mean_steps)
+    angles, gradient = state.angles, state.gradient
     fill_circle(ground, form, link, 0.0, angles)
-    linearise(angles, form, centres, frames, axes, state[4])
+    linearise(angles, form, state.centres, state.frames, state.axes, state.halves)
     gradient[:] = 0.0
-    closure[:] = 0.0
+    state.closure[:] = 0.0
     quadratic[:] = 0.0
     pulls = np.zeros((2, n, 3))
-    mean = np.zeros((n, 3, 3))
     old = np.zeros((3, 3))
     strain = np.zeros((3, 3))
     roll, torque, bending = 0.0, 0.0, 0.0
@@ -149,12 +146,12 @@ def _roll_energy(ground: Any, stiffness: Any, form: int, link: int, quadratic: A
     force = 2.0 * math.sin(math.pi / n) * torque
     circle = np.array([0.0, -force, 0.0, 0.5 * force, -bending, -torque])
     unit = math.pi * bending
-    factors = np.empty((n, FACTOR_WIDTH))
+    factors = new_factors(mean_steps)
     small = np.empty((6, 7))
     target = np.empty(6)
     step = np.empty((n, 3))
     held = positive_shift(
-        state, mean, _HELD * unit, unit, form, circle, factors, small, gradient, target
+        state, mean_steps, _HELD * unit, unit, circle, factors, small, gradient, target
     )
     if held < 0.0:
         return
