@@ -132,7 +132,7 @@ def test_links_add_up_to_j():
     chain = build_chain(parse_sequence("ACGTTGCATGCCGATA" * 16, "two links"), twist_ratio=0.6)
     result = sample_closure(chain, ClosureOptions(tolerance=0.03), seed=10)
     total = sum(math.exp(-share.minus_lnJ) for share in result.links)
-    assert result.J_molar == pytest.approx(total, rel=1e-9)
+    assert result.molar == pytest.approx(total, rel=1e-9)
     assert len(result.links) >= 2
 
 

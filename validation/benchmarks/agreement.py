@@ -19,7 +19,7 @@ from dnacheck.cyclization.closure.sampling import ClosureOptions, ClosureSampler
 from dnacheck.cyclization.half_chain.sampling import HalfChainOptions, half_chain
 from dnacheck.cyclization.laplace.anharmonic import AnharmonicOptions, corrected_laplace
 from dnacheck.cyclization.laplace.register import register_profile
-from dnacheck.cyclization.umbrella.sampling import UmbrellaOptions
+from dnacheck.cyclization.methods import Umbrella
 from dnacheck.equilibria.discrete.search import find_rings
 from dnacheck.model.chain import Chain, build_chain, uniform_stiffness
 from dnacheck.model.molecules import embedded, embedded_names
@@ -34,8 +34,8 @@ from dnacheck.validate.reference.wormlike_chain import chain_rod_j
 
 SEED = 1
 BEST = ("09T15", "08T15", "08A17")
-LONG = UmbrellaOptions(samples=1_000, threads=2)
-SHORT = UmbrellaOptions(samples=100, burn_in=50, thinning=2, threads=2)
+LONG = Umbrella(samples=1_000, burn_in=100)
+SHORT = Umbrella(samples=100, burn_in=50, thinning=2)
 WIDTHS = {
     "closure": 14,
     "corrected-laplace": 17,

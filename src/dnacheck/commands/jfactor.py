@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -18,30 +19,19 @@ from dnacheck.commands.common import (
     target_argument,
 )
 from dnacheck.commands.output import note, print_json, progress
+from dnacheck.cyclization.methods import METHODS, method_named
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from dnacheck.cyclization.result import JFactor
-    from dnacheck.equilibria.discrete.search import RingSearch
 
 EXIT_NOT_CONVERGED = 3
-METHODS = (
-    "auto",
-    "laplace",
-    "register-laplace",
-    "corrected-laplace",
-    "closure",
-    "half-chain",
-    "metropolis",
-)
 
 
 @click.command(epilog="Example:  dnacheck jfactor 08T15 --tolerance 0.02")
 @target_argument
 @click.option(
     "--method",
-    type=click.Choice(METHODS),
+    type=click.Choice(list(METHODS)),
     default="auto",
     show_default=True,
     help="auto takes the cheapest method whose measured error meets the tolerance.",
@@ -84,30 +74,37 @@ def command(
 
     records: list[dict[str, Any]] = []
     good = True
+    way = method_named(method)
     limit = math.inf if max_seconds is None else max_seconds
     for molecule in read_target(target):
         if isinstance(molecule, InputError):
             raise molecule
         began = time.perf_counter()
         chain = build_chain(molecule, **model.chain_arguments())
-        search = find_rings(chain, SearchOptions(links=link))
-        with progress(f"{chain.name}: draws", None, run.quiet or run.json) as advance:
-            try:
-                result, reason = _computed(search, method, tolerance, limit, run, advance)
-            except SolveError as error:
-                if run.json and not records:
-                    raise
-                note(str(error), run.quiet)
-                good = False
-                records.append(_failure(chain.name, chain.n_steps, method, error, began))
-                continue
-        record = result.to_json()
-        if reason:
-            record["reason"] = reason
-        records.append(record)
-        good = good and (result.status.ok or method in ("laplace", "register-laplace"))
+        try:
+            search = find_rings(chain, SearchOptions(links=link))
+            with progress(f"{chain.name}: draws", None, run.quiet or run.json) as advance:
+                result = way.compute(
+                    search,
+                    rng=run.seed,
+                    threads=run.threads,
+                    progress=_by_difference(advance),
+                    tolerance=tolerance,
+                    max_seconds=limit,
+                )
+            if isinstance(link, int):
+                result = result.of_link(link, tolerance)
+        except SolveError as error:
+            if run.json and not records:
+                raise
+            note(str(error), run.quiet)
+            good = False
+            records.append(_failure(chain.name, chain.n_steps, method, error, began))
+            continue
+        records.append(result.to_dict())
+        good = good and (result.status.ok or not way.measures_error)
         if not run.json:
-            _print(result, reason)
+            _print(result)
             for warning in result.warnings:
                 note(f"{chain.name}: {warning}", run.quiet)
     if run.json:
@@ -131,15 +128,8 @@ def _failure(name: str, n_bp: int, method: str, error: Exception, began: float) 
     }
 
 
-def _computed(
-    search: RingSearch,
-    method: str,
-    tolerance: float,
-    limit: float,
-    run: RunSettings,
-    advance: Callable[[int], None],
-) -> tuple[JFactor, str]:
-    """The J factor by the method asked for, and why that method if it was chosen."""
+def _by_difference(advance: Callable[[int], None]) -> Callable[[int], None]:
+    """A bar that moves by differences, told the total."""
     made = 0
 
     def drawn(total: int) -> None:
@@ -147,46 +137,12 @@ def _computed(
         advance(total - made)
         made = total
 
-    if method == "auto":
-        from dnacheck.cyclization.automatic import choose
-
-        choice = choose(search, tolerance, limit, run.seed, run.threads, drawn)
-        return choice.result, choice.reason
-    if method == "laplace":
-        from dnacheck.cyclization.laplace.isolated import laplace
-
-        return laplace(search), ""
-    if method == "register-laplace":
-        from dnacheck.cyclization.laplace.register import register_laplace
-
-        return register_laplace(search), ""
-    if method == "corrected-laplace":
-        from dnacheck.cyclization.laplace.anharmonic import AnharmonicOptions, corrected_laplace
-
-        return corrected_laplace(search, AnharmonicOptions(tolerance=tolerance), run.seed), ""
-    if method == "closure":
-        from dnacheck.cyclization.closure.sampling import ClosureOptions, ClosureSampler
-        from dnacheck.cyclization.laplace.register import register_profile
-
-        options = ClosureOptions(tolerance=tolerance, max_seconds=limit, threads=run.threads)
-        return ClosureSampler(register_profile(search), options, run.seed).sample(drawn), ""
-    if method == "half-chain":
-        from dnacheck.cyclization.automatic import half_chains_to_tolerance
-
-        return half_chains_to_tolerance(search, tolerance, limit, run.seed, run.threads), ""
-    from dnacheck.cyclization.automatic import metropolis_to_tolerance
-
-    return metropolis_to_tolerance(search, tolerance, limit, run.seed, run.threads), ""
+    return drawn
 
 
-def _print(result: JFactor, reason: str) -> None:
+def _print(result: JFactor) -> None:
     """The result for a reader."""
-    text = f"{result.target}: -ln J = {result.minus_lnJ:.4f}"
-    if result.stderr > 0.0:
-        text += f" ± {result.stderr:.4f}"
-    if result.bias_bound:
-        text += f", bias at most {result.bias_bound:.1g}"
-    print(f"{text}; J = {result.J_molar:.3g} M ({result.method}, {result.n_bp} bp)")
+    print(result)
     for share in result.links:
         error = f" ± {share.stderr:.3f}" if share.stderr > 0.0 else ""
         print(f"  link {share.link}: -ln J = {share.minus_lnJ:.3f}{error}")
@@ -195,7 +151,7 @@ def _print(result: JFactor, reason: str) -> None:
             f"  {result.samples} draws, {result.effective_samples:.0f} effective, "
             f"{result.seconds:.2f} s"
         )
-    if reason:
-        print(f"  {reason}")
+    if result.reason:
+        print(f"  {result.reason}")
     if not result.status.ok:
         print(f"  {result.status.value}")

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import enum
+import html
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from dnacheck.numerics.outcome import InputError
+from dnacheck.numerics.outcome import InputError, SolveError
 
 PER_CUBIC_ANGSTROM_IN_MOLAR = 1660.539
 """One molecule per cubic ångström in mol/L, 1e27 Å^3/L over Avogadro's number."""
@@ -57,6 +58,30 @@ class LinkShare:
 
 
 @dataclass(frozen=True)
+class Attempt:
+    """One method that :class:`dnacheck.cyclization.automatic.Auto` tried.
+
+    Attributes
+    ----------
+    method : str
+    minus_lnJ : float
+    error : float
+        Measured error of ln J: standard error and bias bound in quadrature; for Laplace its
+        difference from the pilot sample plus 2.4 of the pilot's standard errors.
+    seconds : float
+        Wall time that it took.
+    met : bool
+        Whether the error meets the tolerance and nothing speaks against the method.
+    """
+
+    method: str
+    minus_lnJ: float
+    error: float
+    seconds: float
+    met: bool
+
+
+@dataclass(frozen=True, repr=False)
 class JFactor:
     """A J factor: the molar density of exact closure, J = exp(-minus_lnJ) mol/L.
 
@@ -88,6 +113,10 @@ class JFactor:
         Wall time.
     warnings : tuple of str
     status : JStatus
+    reason : str
+        Why this method, where it was chosen.
+    tried : tuple of Attempt
+        What was tried before it, and it itself.
     """
 
     target: str
@@ -103,6 +132,8 @@ class JFactor:
     seconds: float = 0.0
     warnings: tuple[str, ...] = ()
     status: JStatus = JStatus.CONVERGED
+    reason: str = ""
+    tried: tuple[Attempt, ...] = ()
 
     def __post_init__(self) -> None:
         if math.isnan(self.minus_lnJ) or not self.stderr >= 0.0:
@@ -112,7 +143,7 @@ class JFactor:
             )
 
     @property
-    def J_molar(self) -> float:
+    def molar(self) -> float:
         """J in mol/L."""
         return math.exp(-self.minus_lnJ)
 
@@ -126,16 +157,58 @@ class JFactor:
             return math.inf
         return math.hypot(self.stderr, self.bias_bound or 0.0)
 
-    def to_json(self) -> dict[str, Any]:
-        """The members of the command's JSON."""
-        return {
+    def of_link(self, link: int, tolerance: float = math.inf) -> JFactor:
+        """The part of J at one link, with its own error.
+
+        Parameters
+        ----------
+        link : int
+        tolerance : float
+            Error of ln J that the part should meet; the status says whether it does.
+
+        Returns
+        -------
+        JFactor
+            Its only link is ``link``. The bias bound of the whole is taken to lie in this part
+            altogether.
+
+        Raises
+        ------
+        SolveError
+            Nothing was found at this link; ``partial`` holds the whole.
+        """
+        share = next((share for share in self.links if share.link == link), None)
+        if share is None:
+            found = ", ".join(str(share.link) for share in self.links) or "none"
+            raise SolveError(
+                f"J factor of {self.target}: no share of link {link} was found (links found: "
+                f"{found}); use --link auto for all of J",
+                self,
+            )
+        bias = self.bias_bound
+        if bias is not None:
+            bias *= math.exp(min(share.minus_lnJ - self.minus_lnJ, 700.0))
+        part = replace(
+            self,
+            minus_lnJ=share.minus_lnJ,
+            stderr=share.stderr,
+            bias_bound=bias,
+            links=(share,),
+        )
+        if self.status is JStatus.CONVERGED and part.total_error > tolerance:
+            return replace(part, status=JStatus.TOLERANCE_NOT_MET)
+        return part
+
+    def to_dict(self) -> dict[str, Any]:
+        """The members of the command's JSON; ``reason`` where the method was chosen."""
+        record = {
             "target": self.target,
             "n_bp": self.n_bp,
             "method": self.method,
             "minus_lnJ": self.minus_lnJ,
             "stderr": self.stderr,
             "bias_bound": self.bias_bound,
-            "J_molar": self.J_molar,
+            "J_molar": self.molar,
             "links": [
                 {"link": share.link, "minus_lnJ": share.minus_lnJ, "stderr": share.stderr}
                 for share in self.links
@@ -147,6 +220,43 @@ class JFactor:
             "status": self.status.value,
             "warnings": list(self.warnings),
         }
+        if self.reason:
+            record["reason"] = self.reason
+        return record
+
+    @property
+    def _errors(self) -> str:
+        text = f" ± {self.stderr:.4f}" if self.stderr > 0.0 else ""
+        return text + (f", bias at most {self.bias_bound:.1g}" if self.bias_bound else "")
+
+    def __str__(self) -> str:
+        return (
+            f"{self.target}: -ln J = {self.minus_lnJ:.4f}{self._errors}; "
+            f"J = {self.molar:.3g} M ({self.method}, {self.n_bp} bp)"
+        )
+
+    def __repr__(self) -> str:
+        word = "" if self.status.ok else f", {self.status.name.lower().replace('_', ' ')}"
+        return f"<JFactor {self}{word}>"
+
+    def _repr_html_(self) -> str:
+        """A table for a notebook."""
+        rows = [
+            ("−ln J", f"{self.minus_lnJ:.4f}{self._errors}"),
+            ("J", f"{self.molar:.3g} M"),
+            ("method", self.method),
+            *(
+                (f"link {s.link}", f"{s.minus_lnJ:.3f}" + (f" ± {s.stderr:.3f}" * (s.stderr > 0)))
+                for s in self.links
+            ),
+            ("status", self.status.value),
+        ]
+        body = "".join(
+            f"<tr><th>{html.escape(name)}</th><td>{html.escape(value)}</td></tr>"
+            for name, value in rows
+        )
+        title = html.escape(f"J factor of {self.target}, {self.n_bp} bp")
+        return f"<table><caption>{title}</caption>{body}</table>"
 
 
 def link_shares(

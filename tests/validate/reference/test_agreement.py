@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from rods import molecule_chain
 
+from dnacheck.cyclization.methods import Umbrella
 from dnacheck.cyclization.result import JFactor
-from dnacheck.cyclization.umbrella.sampling import UmbrellaOptions
 from dnacheck.equilibria.discrete.search import find_rings
 from dnacheck.validate.reference.agreement import (
     CompareOptions,
@@ -20,7 +20,7 @@ SMALL = CompareOptions(
     closure=0.02,
     corrected=0.02,
     halves=8_000,
-    umbrella=UmbrellaOptions(samples=40, burn_in=16, thinning=2),
+    umbrella=Umbrella(samples=40, burn_in=16, thinning=2),
 )
 
 

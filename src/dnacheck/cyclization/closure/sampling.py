@@ -26,7 +26,7 @@ from dnacheck.cyclization.result import JFactor, JStatus, link_shares
 from dnacheck.equilibria.discrete.search import RingSearch
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import InputError, SolveError
-from dnacheck.numerics.seeds import seed_sequence
+from dnacheck.numerics.seeds import Randomness, seed_sequence
 from dnacheck.numerics.statistics import batch_error, summarise_weights
 
 Array = NDArray[np.float64]
@@ -127,7 +127,7 @@ class ClosureSampler:
         self,
         profile: RegisterProfile,
         options: ClosureOptions,
-        seed: int | np.random.SeedSequence = 0,
+        seed: Randomness = 0,
     ) -> None:
         self.profile, self.options = profile, options
         chain = profile.chain
@@ -360,7 +360,7 @@ def _batch_summary(draws: _Draws) -> tuple[float, float]:
 def sample_closure(
     target: Chain | RingSearch | RegisterProfile,
     options: ClosureOptions | None = None,
-    seed: int | np.random.SeedSequence = 0,
+    seed: Randomness = 0,
 ) -> JFactor:
     """J factor by exact-closure importance sampling.
 

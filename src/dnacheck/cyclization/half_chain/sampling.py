@@ -36,6 +36,7 @@ from dnacheck.cyclization.result import JFactor, JStatus
 from dnacheck.equilibria.discrete.search import RingSearch, find_rings
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import InputError, SolveError
+from dnacheck.numerics.seeds import Randomness, generator
 from dnacheck.numerics.statistics import HEAVY_PARETO_SHAPE
 
 Array = NDArray[np.float64]
@@ -304,7 +305,7 @@ def half_chain_estimate(
 def half_chain(
     target: Chain | RingSearch,
     options: HalfChainOptions | None = None,
-    rng: np.random.Generator | int = 0,
+    rng: Randomness = 0,
 ) -> JFactor:
     """J factor by half chains, plain or tilted.
 
@@ -312,8 +313,7 @@ def half_chain(
     ----------
     target : Chain or RingSearch
         A molecule, or the minima already found for it.
-    rng : Generator or int
-        Random numbers, or the seed for them.
+    rng : int, SeedSequence or Generator
 
     Returns
     -------
@@ -328,7 +328,7 @@ def half_chain(
     began = time.perf_counter()
     options = options or HalfChainOptions()
     search = find_rings(target) if isinstance(target, Chain) else target
-    estimate = half_chain_estimate(search, options, np.random.default_rng(rng))
+    estimate = half_chain_estimate(search, options, generator(rng))
     chain = search.chain
     if not math.isfinite(estimate.log_j):
         raise SolveError(

@@ -28,7 +28,7 @@ from dnacheck.cyclization.result import JFactor, JStatus, link_shares
 from dnacheck.equilibria.discrete.search import RingSearch
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import InputError, SolveError
-from dnacheck.numerics.seeds import seed_sequence
+from dnacheck.numerics.seeds import Randomness, seed_sequence
 
 Array = NDArray[np.float64]
 
@@ -88,7 +88,7 @@ class AnharmonicTerm:
 class _Drawer:
     """Draws pairs about the held rings in proportion to their Laplace weights."""
 
-    def __init__(self, profile: RegisterProfile, seed: int | np.random.SeedSequence) -> None:
+    def __init__(self, profile: RegisterProfile, seed: Randomness) -> None:
         chain = profile.chain
         self.chain = chain
         self.stiffness = np.ascontiguousarray(chain.energy_scale_RT * chain.stiffness)
@@ -150,7 +150,7 @@ def _term(log_weights: Array) -> AnharmonicTerm:
 def anharmonic_term(
     profile: RegisterProfile,
     options: AnharmonicOptions | None = None,
-    seed: int | np.random.SeedSequence = 0,
+    seed: Randomness = 0,
 ) -> AnharmonicTerm:
     """First anharmonic term of ln J, from Gaussian draws about the held rings.
 
@@ -180,7 +180,7 @@ def anharmonic_term(
 def corrected_laplace(
     target: Chain | RingSearch | RegisterProfile,
     options: AnharmonicOptions | None = None,
-    seed: int | np.random.SeedSequence = 0,
+    seed: Randomness = 0,
 ) -> JFactor:
     """J factor by register-integrated Laplace with its first anharmonic term.
 

@@ -34,6 +34,7 @@ from dnacheck.equilibria.discrete.search import RingSearch, find_rings
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import InputError
 from dnacheck.numerics.random_numbers import random_state
+from dnacheck.numerics.seeds import Randomness, generator
 
 Array = NDArray[np.float64]
 
@@ -333,7 +334,7 @@ def umbrella_estimate(
 def metropolis(
     target: Chain | RingSearch,
     options: UmbrellaOptions | None = None,
-    rng: np.random.Generator | int = 0,
+    rng: Randomness = 0,
 ) -> JFactor:
     """J factor by Metropolis sampling under closure restraints, joined by MBAR.
 
@@ -341,8 +342,7 @@ def metropolis(
     ----------
     target : Chain or RingSearch
         A molecule, or the minima already found for it.
-    rng : Generator or int
-        Random numbers, or the seed for them.
+    rng : int, SeedSequence or Generator
 
     Returns
     -------
@@ -357,7 +357,7 @@ def metropolis(
     began = time.perf_counter()
     options = options or UmbrellaOptions()
     search = find_rings(target) if isinstance(target, Chain) else target
-    estimate = umbrella_estimate(search, options, np.random.default_rng(rng))
+    estimate = umbrella_estimate(search, options, generator(rng))
     chain = search.chain
     notes = list(chain.warnings)
     poor = estimate.least_overlap < _LEAST_OVERLAP

@@ -10,13 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dnacheck.cyclization.closure.sampling import ClosureOptions, ClosureSampler
-from dnacheck.cyclization.half_chain.sampling import HalfChainOptions, half_chain
-from dnacheck.cyclization.laplace.anharmonic import AnharmonicOptions, corrected_laplace
-from dnacheck.cyclization.laplace.isolated import laplace
-from dnacheck.cyclization.laplace.register import register_laplace, register_profile
+from dnacheck.cyclization.laplace.register import register_profile
+from dnacheck.cyclization.methods import ClosureSampling, HalfChain, Laplace, Umbrella
 from dnacheck.cyclization.result import JFactor
-from dnacheck.cyclization.umbrella.sampling import UmbrellaOptions, metropolis
 from dnacheck.equilibria.discrete.search import RingSearch
 from dnacheck.numerics.outcome import SolveError
 
@@ -36,7 +32,7 @@ class CompareOptions:
         Error asked of Laplace with its first anharmonic term.
     halves, plain_halves : int
         Halves on each side, tilted and plain.
-    umbrella : UmbrellaOptions or None
+    umbrella : Umbrella or None
     threads : int
     """
 
@@ -44,7 +40,7 @@ class CompareOptions:
     corrected: float | None = 0.005
     halves: int = 40_000
     plain_halves: int = 0
-    umbrella: UmbrellaOptions | None = None
+    umbrella: Umbrella | None = None
     threads: int = 1
 
 
@@ -62,26 +58,22 @@ def compare_methods(
     profile = register_profile(search)
     results: dict[str, JFactor] = {}
     with contextlib.suppress(SolveError):
-        results["laplace"] = laplace(search)
-    results["register-laplace"] = register_laplace(profile)
+        results["laplace"] = Laplace().compute(search)
+    results["register-laplace"] = Laplace(register=True).compute(profile)
     if options.corrected is not None:
-        wanted = AnharmonicOptions(tolerance=options.corrected)
-        results["corrected-laplace"] = corrected_laplace(profile, wanted, seeds[0])
-    exact = ClosureOptions(tolerance=options.closure, threads=options.threads)
-    results["closure"] = ClosureSampler(profile, exact, seeds[1]).sample()
-    for name, halves, place in (
-        ("half-chain", options.halves, 2),
-        ("half-chain-plain", options.plain_halves, 3),
-    ):
-        if halves:
-            sizes = HalfChainOptions(
-                halves=halves, tilted=name == "half-chain", threads=options.threads
-            )
-            results[name] = half_chain(search, sizes, np.random.default_rng(seeds[place]))
-    if options.umbrella is not None:
-        results["metropolis"] = metropolis(
-            search, options.umbrella, np.random.default_rng(seeds[4])
+        results["corrected-laplace"] = Laplace(register=True, order=1).compute(
+            profile, rng=seeds[0], tolerance=options.corrected
         )
+    threads = options.threads
+    results["closure"] = ClosureSampling().compute(
+        profile, rng=seeds[1], tolerance=options.closure, threads=threads
+    )
+    for tilted, halves, place in ((True, options.halves, 2), (False, options.plain_halves, 3)):
+        if halves:
+            way = HalfChain(halves, tilted)
+            results[way.name] = way.compute(search, rng=seeds[place], threads=threads)
+    if options.umbrella is not None:
+        results["metropolis"] = options.umbrella.compute(search, rng=seeds[4], threads=threads)
     return results
 
 

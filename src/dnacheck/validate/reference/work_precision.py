@@ -11,17 +11,12 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from dnacheck.cyclization.closure.sampling import ClosureOptions, ClosureSampler, sample_closure
-from dnacheck.cyclization.half_chain.sampling import HalfChainOptions, half_chain
-from dnacheck.cyclization.laplace.anharmonic import AnharmonicOptions, corrected_laplace
-from dnacheck.cyclization.laplace.isolated import laplace
-from dnacheck.cyclization.laplace.register import register_laplace, register_profile
+from dnacheck.cyclization.methods import ClosureSampling, HalfChain, Laplace, Method, Umbrella
 from dnacheck.cyclization.result import JFactor
-from dnacheck.cyclization.umbrella.sampling import UmbrellaOptions, metropolis
-from dnacheck.equilibria.discrete.search import find_rings
 from dnacheck.model.chain import Chain, build_chain
 from dnacheck.model.molecules import embedded
 from dnacheck.model.sequence import parse_sequence
@@ -142,20 +137,8 @@ def _runs(
 ) -> list[tuple[str, str, Callable[[], JFactor]]]:
     """Method, size and computation of every run."""
 
-    def closure(batches: int, seed: np.random.SeedSequence) -> JFactor:
-        sizes = ClosureOptions(tolerance=_ANY, first_batches=batches)
-        return ClosureSampler(register_profile(chain), sizes, seed).sample()
-
-    def corrected(pairs: int, seed: np.random.SeedSequence) -> JFactor:
-        return corrected_laplace(chain, AnharmonicOptions(_ANY, pairs), seed)
-
-    def halves(count: int, tilted: bool, seed: np.random.SeedSequence) -> JFactor:
-        sizes = HalfChainOptions(halves=count, tilted=tilted)
-        return half_chain(chain, sizes, np.random.default_rng(seed))
-
-    def umbrella(records: int, seed: np.random.SeedSequence) -> JFactor:
-        sizes = UmbrellaOptions(samples=records, burn_in=16, thinning=1)
-        return metropolis(chain, sizes, np.random.default_rng(seed))
+    def computed(method: Method, seed: np.random.SeedSequence) -> JFactor:
+        return method.compute(chain, rng=seed, tolerance=_ANY)
 
     def fixed(work: Callable[..., JFactor], *arguments: object) -> Callable[[], JFactor]:
         (seed,) = seeds.spawn(1)
@@ -165,17 +148,17 @@ def _runs(
         )
 
     runs: list[tuple[str, str, Callable[[], JFactor]]] = [
-        ("laplace", "", lambda: laplace(find_rings(chain))),
-        ("register-laplace", "", lambda: register_laplace(chain)),
+        (method.name, "", partial(method.compute, chain))
+        for method in (Laplace(), Laplace(register=True))
     ]
-    runs += [("corrected-laplace", f"{2 * n} draws", fixed(corrected, n)) for n in options.pairs]
-    runs += [("closure", f"{16 * n} draws", fixed(closure, n)) for n in options.batches]
-    runs += [("half-chain", f"2 x {n} halves", fixed(halves, n, True)) for n in options.halves]
-    runs += [
-        ("half-chain-plain", f"2 x {n} halves", fixed(halves, n, False))
-        for n in options.plain_halves
+    sized: list[tuple[Method, str]] = [
+        *((Laplace(True, 1, n), f"{2 * n} draws") for n in options.pairs),
+        *((ClosureSampling(first_batches=n), f"{16 * n} draws") for n in options.batches),
+        *((HalfChain(n), f"2 x {n} halves") for n in options.halves),
+        *((HalfChain(n, tilted=False), f"2 x {n} halves") for n in options.plain_halves),
+        *((Umbrella(n, burn_in=16, thinning=1), f"{n} records") for n in options.records),
     ]
-    runs += [("metropolis", f"{n} records", fixed(umbrella, n)) for n in options.records]
+    runs += [(method.name, size, fixed(computed, method)) for method, size in sized]
     return runs
 
 
@@ -188,7 +171,7 @@ def study(name: str, chain: Chain, options: SpeedOptions, seed: int = 0) -> Spee
         The reference cannot be computed.
     """
     own, others = np.random.SeedSequence(seed).spawn(2)
-    exact = sample_closure(chain, ClosureOptions(tolerance=REFERENCE_ERROR), own)
+    exact = ClosureSampling().compute(chain, rng=own, tolerance=REFERENCE_ERROR)
     points: list[SpeedPoint] = []
     failed: list[str] = []
     for method, size, run in _runs(chain, options, others):

@@ -31,19 +31,19 @@ def _method_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table:
 
 def laplace(context: Context) -> Findings:
     """Laplace, plain and register-integrated, against exact-closure sampling."""
-    from dnacheck.cyclization.laplace.anharmonic import AnharmonicOptions, corrected_laplace
-    from dnacheck.cyclization.laplace.isolated import laplace as plain
-    from dnacheck.cyclization.laplace.register import register_laplace, register_profile
+    from dnacheck.cyclization.laplace.register import register_profile
+    from dnacheck.cyclization.methods import Laplace
 
     wanted = context.scene.wanted.ln_J or 0.05
     results, rows = [], []
     for index, chain in enumerate(chains(context)):
         best = sampled(chain, min(0.01, wanted), context.seed + index)
         profile = register_profile(chain)
-        held = register_laplace(profile)
-        term = corrected_laplace(profile, AnharmonicOptions(0.01), context.seed + 1000 + index)
+        held = Laplace(register=True).compute(profile)
+        corrected = Laplace(register=True, order=1)
+        term = corrected.compute(profile, rng=context.seed + 1000 + index, tolerance=0.01)
         try:
-            simple = plain(chain).minus_lnJ
+            simple = Laplace().compute(chain).minus_lnJ
         except SolveError:
             simple = None
         length = chain.n_steps * chain.rise_A
@@ -52,7 +52,7 @@ def laplace(context: Context) -> Findings:
             {
                 **row(best),
                 "n_bp": chain.n_steps,
-                "J": best.J_molar,
+                "J": best.molar,
                 "laplace": simple,
                 "register": held.minus_lnJ,
                 "register_bias": held.minus_lnJ - best.minus_lnJ,
@@ -189,16 +189,16 @@ def _compared(context: Context) -> list[Chain]:
 
 def _effort(context: Context, chain: Chain, slow: bool) -> CompareOptions:
     """How long each method runs; the slow ones longest on the three best cyclizers."""
-    from dnacheck.cyclization.umbrella.sampling import UmbrellaOptions
+    from dnacheck.cyclization.methods import Umbrella
     from dnacheck.validate.reference.agreement import CompareOptions
 
     best = chain.name in BEST
     if context.level is Level.FULL:
         return CompareOptions(
             plain_halves=400_000 if best else 0,
-            umbrella=UmbrellaOptions(samples=1000 if best else 400) if slow else None,
+            umbrella=Umbrella(samples=1000 if best else 400, burn_in=100) if slow else None,
         )
-    umbrella = UmbrellaOptions(samples=100 if best else 40, burn_in=50 if best else 16, thinning=2)
+    umbrella = Umbrella(samples=100 if best else 40, burn_in=50 if best else 16, thinning=2)
     return CompareOptions(
         closure=0.01, corrected=0.01, halves=8_000, umbrella=umbrella if slow else None
     )

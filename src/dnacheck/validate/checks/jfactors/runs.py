@@ -16,9 +16,9 @@ BEST = ("09T15", "08T15", "08A17")
 
 def sampled(chain: Chain, tolerance: float, seed: int) -> JFactor:
     """Exact-closure sampling to a standard error."""
-    from dnacheck.cyclization.closure.sampling import ClosureOptions, sample_closure
+    from dnacheck.cyclization.methods import ClosureSampling
 
-    return sample_closure(chain, ClosureOptions(tolerance=tolerance), seed)
+    return ClosureSampling().compute(chain, rng=seed, tolerance=tolerance)
 
 
 def chains(context: Context) -> list[Chain]:

@@ -14,27 +14,33 @@ from dnacheck.validate.engine.verdict import CheckResult, Rule, judge, must_fail
 from dnacheck.validate.report.record import Column, Table
 
 if TYPE_CHECKING:
-    from dnacheck.cyclization.automatic import Choice
     from dnacheck.cyclization.result import JFactor
     from dnacheck.model.chain import Chain
 
 SHOWN_ROWS = 500
 _FINER = 10.0
 _FINEST_REFERENCE = 0.003
-_METHODS = ("laplace", "register-laplace", "closure", "half-chain", "metropolis")
+_METHODS = (
+    "laplace",
+    "register-laplace",
+    "corrected-laplace",
+    "closure",
+    "half-chain",
+    "metropolis",
+)
 """From the cheapest to the dearest."""
 
 
 def ln_J(context: Context) -> Findings:
     """Every molecule's J factor, with what was tried and why it was enough."""
-    from dnacheck.cyclization.automatic import choose
+    from dnacheck.cyclization.methods import Auto
 
     accuracy = context.scene.wanted.ln_J
     assert accuracy is not None
     variants = variants_of(context)
     with contextlib.suppress(SolveError):  # compiles, so that the times are of warm code
-        choose(variants[0][2], accuracy)
-    chosen: dict[int, tuple[Chain, Choice]] = {}
+        Auto().compute(variants[0][2], tolerance=accuracy)
+    chosen: dict[int, tuple[Chain, JFactor]] = {}
     rows, unsolved = [], []
     for index, (angles, ratio, chain) in enumerate(variants):
         row: dict[str, Any] = {
@@ -44,19 +50,18 @@ def ln_J(context: Context) -> Findings:
             "ratio": ratio,
         }
         try:
-            choice = choose(chain, accuracy, seed=context.seed + index)
+            found = Auto().compute(chain, rng=context.seed + index, tolerance=accuracy)
         except SolveError as error:
             unsolved.append(chain.name)
             row["reason"] = str(error)
         else:
-            chosen[id(chain)] = chain, choice
-            found = choice.result
+            chosen[id(chain)] = chain, found
             row |= {
                 "minus_lnJ": found.minus_lnJ,
                 "error": found.total_error,
-                "J": found.J_molar,
+                "J": found.molar,
                 "method": found.method,
-                "reason": choice.reason,
+                "reason": found.reason,
             }
         rows.append(row)
     choices = [choice for _, choice in chosen.values()]
@@ -73,7 +78,7 @@ def ln_J(context: Context) -> Findings:
         judge(
             "wanted.ln_J[accuracy]",
             "largest error of −ln J, as its method measures it",
-            max((choice.result.total_error for choice in choices), default=float("inf")),
+            max((choice.total_error for choice in choices), default=float("inf")),
             accuracy,
             Rule.AT_MOST,
             "the scene's wish",
@@ -88,19 +93,20 @@ def ln_J(context: Context) -> Findings:
 def _against_reference(
     context: Context,
     chains: Sequence[Chain],
-    chosen: dict[int, tuple[Chain, Choice]],
+    chosen: dict[int, tuple[Chain, JFactor]],
     accuracy: float,
 ) -> list[CheckResult]:
     """The pilots against a reference that is ten times finer, and energies in place of J."""
-    from dnacheck.cyclization.closure.sampling import ClosureOptions, sample_closure
+    from dnacheck.cyclization.methods import ClosureSampling
     from dnacheck.validate.engine.rings import lowest_ring
 
-    options = ClosureOptions(tolerance=max(accuracy / _FINER, _FINEST_REFERENCE))
+    finer = max(accuracy / _FINER, _FINEST_REFERENCE)
     results = []
     used = pilots(chains) if chains else []
     for number, chain in enumerate(used):
-        reference = sample_closure(chain, options, seed=context.seed + 1_000_003 + number)
-        found = chosen[id(chain)][1].result
+        seed = context.seed + 1_000_003 + number
+        reference = ClosureSampling().compute(chain, rng=seed, tolerance=finer)
+        found = chosen[id(chain)][1]
         results.append(_pilot(chain.name, found.minus_lnJ, reference, accuracy))
         if number == 0:
             wrong = _pilot(
@@ -150,13 +156,13 @@ def _table(context: Context, rows: Sequence[dict[str, Any]]) -> Table:
     )
 
 
-def _methods(choices: Sequence[Choice], accuracy: float) -> Table:
+def _methods(choices: Sequence[JFactor], accuracy: float) -> Table:
     """How often each method was tried, and with what outcome."""
     rows = []
-    seen = [attempt.method for choice in choices for attempt in choice.attempts]
+    seen = [attempt.method for choice in choices for attempt in choice.tried]
     # in the order in which they were tried, which is that of their cost
     for method in dict.fromkeys([*seen, *_METHODS]):
-        tried = [a for choice in choices for a in choice.attempts if a.method == method]
+        tried = [a for choice in choices for a in choice.tried if a.method == method]
         if not tried:
             rows.append({"method": method, "tried": 0, "decision": "left out: dearer, not needed"})
             continue
