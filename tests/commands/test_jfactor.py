@@ -94,6 +94,20 @@ def test_a_molecule_without_a_stable_ring_is_said(capsys, monkeypatch):
         assert "ln J" not in out
 
 
+def test_a_link_asked_for_gets_its_own_share_or_an_error(capsys):
+    code, out, _ = run(capsys, "jfactor", "08T15", "--json", "--link", "14", "--method", "closure")
+    record = json.loads(out)
+    assert code == 0
+    assert [share["link"] for share in record["links"]] == [14]
+    assert record["minus_lnJ"] == record["links"][0]["minus_lnJ"] > 30.0
+    assert 0.0 < record["stderr"] < 0.03
+    # chains may pass through themselves: from link 17 all go to link 15
+    code, out, err = run(capsys, "jfactor", "08T15", "--link", "17", "--method", "closure")
+    assert code == 3
+    assert "link 17" in err
+    assert "ln J" not in out
+
+
 @pytest.mark.parametrize("method", ["laplace", "register-laplace", "corrected-laplace", "closure"])
 def test_methods_by_name(capsys, method):
     code, out, _ = run(capsys, "jfactor", "15A09", "--json", "--method", method)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from dnacheck.cyclization.method import Method, Run, rings_of
+from dnacheck.numerics.outcome import SolveError
 
 if TYPE_CHECKING:
     from dnacheck.cyclization.half_chain.sampling import HalfChainOptions
@@ -88,18 +89,27 @@ class HalfChain(Method):
         while True:
             began = time.perf_counter()
             rng = generator(sequence.spawn(1)[0])
-            result = half_chain(search, self.options(run, halves), rng)
-            drawn += result.samples
+            options = self.options(run, halves)
+            failure = None
+            try:
+                result = half_chain(search, options, rng)
+            except SolveError as error:  # more halves may do
+                failure = error
+            else:
+                if best is None or result.total_error < best.total_error:
+                    best = result
+            drawn += 2 * options.halves
             if run.progress is not None:
                 run.progress(drawn)
-            if best is None or result.total_error < best.total_error:
-                best = result
             now = time.perf_counter()
             halves *= 4
-            met = best.total_error <= run.tolerance
+            met = best is not None and best.total_error <= run.tolerance
             # Four times the halves make up to sixteen times the pairs.
             if met or halves > _MOST_HALVES or now + 4.0 * (now - began) > deadline:
                 break
+        if best is None:
+            assert failure is not None
+            raise failure
         if not met and best.status is not JStatus.HEAVY_TAILS:
             best = replace(best, status=JStatus.TOLERANCE_NOT_MET)
         return best
