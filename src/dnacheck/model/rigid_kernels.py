@@ -78,13 +78,17 @@ class RigidKinematics(NamedTuple):
 
 @njit(cache=True, nogil=True)
 def new_kinematics(n: int) -> RigidKinematics:
-    return RigidKinematics(
-        np.empty((n + 1, 3)),
-        np.empty((n + 1, 3, 3)),
+    """Room for ``n`` steps, frame 0 the identity at the origin."""
+    kinematics = RigidKinematics(
+        np.zeros((n + 1, 3)),
+        np.zeros((n + 1, 3, 3)),
         np.empty((n, 3, 3)),
         np.empty((n, 6, 3)),
         np.empty((n, 18)),
     )
+    for i in range(3):
+        kinematics.frames[0, i, i] = 1.0
+    return kinematics
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
@@ -126,7 +130,7 @@ def _put(out: Any, s: int, j: int, v: Any) -> None:
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def linearise_rigid(coordinates: Any, kinematics: RigidKinematics) -> None:
-    """Fill centres, frames and first derivatives of a chain whose frame 0 is the identity.
+    """Fill centres, frames and first derivatives of a chain from the pose of frame 0 on.
 
     ``coordinates`` is (N, 6) in the order of ``RIGID_COORDINATES``. Second derivatives within a
     step are in :mod:`dnacheck.equilibria.discrete.kernels.rigid_factorisation`.
@@ -138,10 +142,6 @@ def linearise_rigid(coordinates: Any, kinematics: RigidKinematics) -> None:
     cosines = np.empty(n)
     sines = np.empty(n)
     sines_and_cosines(half, sines, cosines)
-    for i in range(3):
-        centres[0, i] = 0.0
-        for j in range(3):
-            frames[0, i, j] = 1.0 if i == j else 0.0
     for s in range(n):
         p, r = coordinates[s, 1], coordinates[s, 2]
         square = p * p + r * r

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,13 +10,21 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dnacheck.equilibria.boundary import AnyBoundary, Loop, Pull, Ring
 from dnacheck.equilibria.discrete.kernels import newton as nk
 from dnacheck.equilibria.discrete.spectrum import smallest_projected_eigenvalue
-from dnacheck.model.chain import Chain, chain_frames, energy_parts
-from dnacheck.numerics.curve_topology import edge_frames, link_of_ring
+from dnacheck.model.chain import Chain, chain_frames, elastic_energy, energy_parts
+from dnacheck.numerics.curve_topology import (
+    edge_frames,
+    link_of_ring,
+    polygon_writhe,
+    total_twist,
+)
 from dnacheck.numerics.outcome import InputError, SolveError, Status
 
 Array = NDArray[np.float64]
+
+RING = Ring()
 
 _STATUS = {
     nk.CONVERGED: Status.CONVERGED,
@@ -80,13 +89,15 @@ class DiscreteRing:
         Coordinates of each step: tau, theta, phi in radians, or the six of a rigid step; read-only.
     multipliers : ndarray, shape (6,)
         Force (reduced energy per step length) and moment (reduced energy per radian) of closure,
-        in the frame of the first base pair: gradient + (closure Jacobian)^T multipliers = 0.
+        in the frame of the target (the first base pair's for a ring): gradient + (closure
+        Jacobian)^T multipliers = 0. Minus the loads on components that are free.
     energy : float
         Reduced elastic energy (2.3).
-    link : int
-        Turns of the frames about the ring; twist + writhe.
+    ring_link : int or None
+        Turns of the frames about the ring; twist + writhe. None unless the boundary is a ring.
     twist, writhe : float
-        In turns, of the polygon of base-pair centres.
+        In turns, of the polygon of base-pair centres. Without a link the twist ends at the nick,
+        and the writhe is not a number where the ends do not meet.
     stable : bool or None
         Whether the projected Hessian is positive; None where the search did not converge, or
         where an eigenvalue is zero to round-off (``status`` tells which).
@@ -101,13 +112,14 @@ class DiscreteRing:
     seconds : float
         Wall time of the solve.
     status : Status
+    boundary : Ring, NickedRing, HingedRing, Loop or Pull
     """
 
     chain: Chain
     angles: Array
     multipliers: Array
     energy: float
-    link: int
+    ring_link: int | None
     twist: float
     writhe: float
     stable: bool | None
@@ -118,6 +130,20 @@ class DiscreteRing:
     iterations: int
     seconds: float
     status: Status
+    boundary: AnyBoundary = RING
+
+    @property
+    def link(self) -> int:
+        """Turns of the frames about the ring.
+
+        Raises
+        ------
+        InputError
+            The end is not that of a ring.
+        """
+        if self.ring_link is None:
+            raise InputError(f"a {self.boundary.label} chain has no link; ask a ring for it")
+        return self.ring_link
 
     @property
     def energy_RT(self) -> float:
@@ -157,27 +183,45 @@ class DiscreteRing:
     @cached_property
     def smallest_eigenvalue(self) -> float:
         """Smallest eigenvalue of the projected Hessian, reduced energy per square radian."""
-        return smallest_projected_eigenvalue(self.chain, self.angles, self.multipliers)
+        return smallest_projected_eigenvalue(
+            self.chain, self.angles, self.multipliers, self.boundary.for_chain(self.chain)
+        )
 
 
-def _topology(chain: Chain, centres: Array, frames: Array) -> tuple[int, float, float]:
+def _topology(
+    chain: Chain, centres: Array, frames: Array, boundary: AnyBoundary
+) -> tuple[int | None, float, float]:
     """Link, twist and writhe in turns; of rigid steps, about the edges between their centres."""
+    if not np.isfinite(centres).all():
+        return (0 if boundary == RING else None), 0.0, 0.0
     if chain.rigid:
         along = np.empty_like(frames)
         edge_frames(centres, frames, along)
         frames = along
+    if boundary != RING:
+        meets = not isinstance(boundary, (Loop, Pull))
+        writhe = float(polygon_writhe(centres[:-1])) if meets else math.nan
+        return None, float(total_twist(frames)), writhe
     link, twist, writhe = link_of_ring(centres, frames)
     return int(link), float(twist), float(writhe)
 
 
 def make_ring(
-    chain: Chain, angles: Array, multipliers: Array, figures: Array, code: int, seconds: float
+    chain: Chain,
+    angles: Array,
+    multipliers: Array,
+    figures: Array,
+    code: int,
+    seconds: float,
+    boundary: AnyBoundary = RING,
 ) -> DiscreteRing:
     """Wrap what the compiled solver left into a :class:`DiscreteRing`."""
     centres, frames = chain_frames(angles, chain.step_form)
     converged = code == nk.CONVERGED
-    link, twist, writhe = (
-        _topology(chain, centres, frames) if np.isfinite(centres).all() else (0, 0.0, 0.0)
+    link, twist, writhe = _topology(chain, centres, frames, boundary)
+    # What the solver lowers under loads is the energy less their work.
+    energy = (
+        elastic_energy(chain, angles) if isinstance(boundary, Pull) else float(figures[nk.ENERGY])
     )
     negatives = int(figures[nk.NEGATIVES])
     neutral = converged and figures[nk.NEUTRAL] > 0.0
@@ -192,8 +236,8 @@ def make_ring(
         chain=chain,
         angles=angles,
         multipliers=multipliers,
-        energy=float(figures[nk.ENERGY]),
-        link=link,
+        energy=energy,
+        ring_link=link,
         twist=twist,
         writhe=writhe,
         stable=negatives == 0 if converged and (negatives or not neutral) else None,
@@ -204,6 +248,7 @@ def make_ring(
         iterations=int(figures[nk.ITERATIONS]),
         seconds=seconds,
         status=status,
+        boundary=boundary,
     )
 
 
@@ -212,9 +257,10 @@ def solve_ring(
     start: ArrayLike,
     options: NewtonOptions | None = None,
     *,
+    boundary: AnyBoundary = RING,
     throw: bool = True,
 ) -> DiscreteRing:
-    """Closed equilibrium of a chain from a starting shape.
+    """Equilibrium of a chain, closed to a ring or held by another boundary, from a start.
 
     Parameters
     ----------
@@ -243,13 +289,15 @@ def solve_ring(
         angles,
         multipliers,
         chain.arrays,
+        boundary.for_chain(chain),
         options.limits,
         figures,
     )
-    ring = make_ring(chain, angles, multipliers, figures, code, time.perf_counter() - began)
+    seconds = time.perf_counter() - began
+    ring = make_ring(chain, angles, multipliers, figures, code, seconds, boundary)
     if throw and not ring.status.ok:
         raise SolveError(
-            f"discrete ring of {chain.name}: residual {ring.residual:.1e} after "
+            f"discrete {boundary.label} of {chain.name}: residual {ring.residual:.1e} after "
             f"{ring.iterations} iterations; {ring.status.value}",
             ring,
         )

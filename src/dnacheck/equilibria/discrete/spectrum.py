@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from dnacheck.equilibria.boundary_kernels import Boundary, ring_boundary, solve_held
 from dnacheck.equilibria.discrete.kernels.states import (
     evaluate,
     factorise_state,
@@ -14,7 +15,6 @@ from dnacheck.equilibria.discrete.kernels.states import (
     substitute,
 )
 from dnacheck.model.chain import Chain
-from dnacheck.numerics.small_systems import solve_small
 
 Array = NDArray[np.float64]
 
@@ -26,14 +26,20 @@ class ProjectedInverse:
     """The inverse of the projected Hessian at a point of a chain, applied in linear time.
 
     For a vector x (N, c) it gives Z (Z^T H Z)^-1 Z^T x, where Z spans the changes that keep the
-    chain closed to first order.
+    held components of the end where they are to first order.
     """
 
-    def __init__(self, chain: Chain, angles: Array, multipliers: Array) -> None:
+    def __init__(
+        self,
+        chain: Chain,
+        angles: Array,
+        multipliers: Array,
+        boundary: Boundary | None = None,
+    ) -> None:
         steps = chain.arrays
         # Copies: a ring's own arrays are read-only, for which kernels would be compiled anew.
         multipliers = np.array(multipliers)
-        self.state = new_state(steps)
+        self.state = new_state(steps, boundary or ring_boundary())
         self.state.angles[:] = angles
         evaluate(self.state, steps)
         self.length = float(chain.n_steps)
@@ -47,19 +53,21 @@ class ProjectedInverse:
         """Apply to ``x`` (N, c)."""
         replace_rhs(self.state, self.factors, x, self.small)
         multipliers = np.empty(6)
-        solve_small(self.small, -self.small[:, 6], self.length, multipliers)
+        solve_held(self.state.boundary, self.small, -self.small[:, 6], self.length, multipliers)
         step = np.empty_like(x)
         substitute(self.state, self.factors, multipliers, 1.0, step)
         return -step
 
 
-def smallest_projected_eigenvalue(chain: Chain, angles: Array, multipliers: Array) -> float:
+def smallest_projected_eigenvalue(
+    chain: Chain, angles: Array, multipliers: Array, boundary: Boundary | None = None
+) -> float:
     """Algebraically smallest eigenvalue of the projected Hessian, by Lanczos on its inverse.
 
     In reduced energy per square radian, for the Euclidean metric of the 3N angles; of rigid steps,
     for that of their 6N coordinates in radians and units of length.
     """
-    inverse = ProjectedInverse(chain, angles, multipliers)
+    inverse = ProjectedInverse(chain, angles, multipliers, boundary)
     rng = np.random.default_rng(0)
     basis = [inverse(rng.standard_normal(chain.ground.shape))]
     basis[0] /= np.linalg.norm(basis[0])

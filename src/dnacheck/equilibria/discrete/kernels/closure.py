@@ -23,15 +23,28 @@ from dnacheck.numerics.trigonometry import sines_and_cosines
 _ORTHONORMALISE_EVERY = 64
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, nogil=True)
 def linearise(angles: Any, form: int, centres: Any, frames: Any, axes: Any, halves: Any) -> None:
+    """:func:`linearise_placed` of a chain whose frame 0 is the identity at the origin."""
+    for i in range(3):
+        centres[0, i] = 0.0
+        for j in range(3):
+            frames[0, i, j] = 1.0 if i == j else 0.0
+    linearise_placed(angles, form, centres, frames, axes, halves)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+def linearise_placed(
+    angles: Any, form: int, centres: Any, frames: Any, axes: Any, halves: Any
+) -> None:
     """Frames of a chain and the axis of every angle, in one pass.
 
     Parameters
     ----------
     angles : (N, 3), tau, theta, phi of each step in radians.
     form : 0 for the wedge (2.1), 1 for the symmetrised mid-step product.
-    centres, frames, axes : (N+1, 3), (N+1, 3, 3), (N, 3, 3), filled.
+    centres, frames, axes : (N+1, 3), (N+1, 3, 3), (N, 3, 3), filled, from the pose of the first
+        base pair that they hold.
         ``axes[i, j]`` is the laboratory axis of angle j of step i.
     halves : (N, 5, 3) for the mid-step form, else empty; filled with the axes of its elementary
         turns tau/2, theta/2, phi, theta/2, tau/2.
@@ -45,10 +58,6 @@ def linearise(angles: Any, form: int, centres: Any, frames: Any, axes: Any, halv
     cosines = np.empty((n, 3))
     sines = np.empty((n, 3))
     sines_and_cosines(turns.reshape(3 * n), sines.reshape(3 * n), cosines.reshape(3 * n))
-    for i in range(3):
-        centres[0, i] = 0.0
-        for j in range(3):
-            frames[0, i, j] = 1.0 if i == j else 0.0
     for s in range(n):
         ct, st = cosines[s, 0], sines[s, 0]
         ch, sh = cosines[s, 1], sines[s, 1]

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from dnacheck.equilibria.boundary_kernels import solve_held
 from dnacheck.equilibria.discrete.kernels.states import (
     accumulated_turn,
     factorise_state,
     replace_rhs,
     substitute,
 )
-from dnacheck.numerics.small_systems import solve_small
 
 # First shift tried, relative to the energy of a bent circle.
 FIRST_SHIFT = 0.05
@@ -51,7 +51,9 @@ def solve_kkt(
     rhs = np.empty(6)
     for i in range(6):
         rhs[i] = state.closure[i] - small[i, 6]
-    small_negatives, log_small = solve_small(small, rhs, float(slope.shape[0]), change)
+    small_negatives, log_small = solve_held(
+        state.boundary, small, rhs, float(slope.shape[0]), change
+    )
     # The inertia of the KKT matrix is that of H and of minus the Schur complement.
     if small_negatives < 0:
         return -1, -math.inf, weakest
@@ -74,7 +76,7 @@ def least_stable(state: Any, factors: Any, small: Any, direction: Any) -> bool:
     turn = 1.0
     for _ in range(_INVERSE_ITERATIONS):
         replace_rhs(state, factors, direction, small)
-        if solve_small(small, -small[:, 6], float(n), target)[0] < 0:
+        if solve_held(state.boundary, small, -small[:, 6], float(n), target)[0] < 0:
             return False
         substitute(state, factors, target, 1.0, direction)
         turn = accumulated_turn(state, direction)

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from dnacheck.equilibria.boundary_kernels import solve_held
 from dnacheck.equilibria.discrete.kernels.states import (
     evaluate,
     jacobian,
     lagrangian_slope,
     turn_frames,
 )
-from dnacheck.numerics.small_systems import solve_small
 
 # Frames that turn by more than this (rad) are turned; the angles of smaller steps are added.
 # Rolling is a rotation of frames, so even small steps along a soft register gain by it.
@@ -74,7 +74,7 @@ def restore(state: Any, stiffness: Any, defect: Any, mend: Any) -> bool:
                 pull = rows[i, c * s + j] / stiffness[s, j, j]
                 for k in range(6):
                     metric[i, k] += pull * rows[k, c * s + j]
-    if solve_small(metric, defect, float(n), weights)[0] < 0:
+    if solve_held(state.boundary, metric, defect, float(n), weights)[0] < 0:
         return False
     for s in range(n):
         for j in range(c):
@@ -82,6 +82,25 @@ def restore(state: Any, stiffness: Any, defect: Any, mend: Any) -> bool:
             for i in range(6):
                 mend[s, j] -= rows[i, c * s + j] * weights[i] / stiffness[s, j, j]
     return True
+
+
+@njit(cache=True, nogil=True)
+def _work(state: Any, step: Any) -> float:
+    """Work of the loads along a step (N, c), to first order."""
+    loads = state.boundary.loads
+    loaded = False
+    for i in range(6):
+        loaded = loaded or loads[i] != 0.0
+    work = 0.0
+    if loaded:
+        n, c = step.shape
+        rows = np.empty((6, c * n))
+        jacobian(state, rows)
+        for i in range(6):
+            for s in range(n):
+                for j in range(c):
+                    work += loads[i] * rows[i, c * s + j] * step[s, j]
+    return work
 
 
 @njit(cache=True, nogil=True)
@@ -98,9 +117,9 @@ def line_search(
 ) -> tuple[float, float, float]:
     """Find a fraction of a step that improves, and leave the state there in ``trial``.
 
-    The merit is energy + weight * closure residual, an exact penalty. Where the curvature of
-    closure spoils a trial, :func:`restore` sends it back to what the linearised closure promised,
-    once.
+    The merit is energy (less the loads' work) + weight * closure residual, an exact penalty. Where
+    the curvature of closure spoils a trial, :func:`restore` sends it back to what the linearised
+    closure promised, once.
 
     Returns
     -------
@@ -117,10 +136,12 @@ def line_search(
     for s in range(n):
         for j in range(c):
             slope += gradient[s, j] * step[s, j]
+    slope -= _work(state, step)
     size = _closure_size(closure, length)
     weight = 0.0
     for i in range(6):
-        weight += (target[i] * (length if i < 3 else 1.0)) ** 2
+        if state.boundary.fixed[i]:
+            weight += (target[i] * (length if i < 3 else 1.0)) ** 2
     weight = 2.0 * math.sqrt(weight)
     if size > 0.0 and slope > 0.0:
         weight = max(weight, 2.0 * slope / size)
@@ -129,6 +150,7 @@ def line_search(
     noise = 1e-13 * (abs(energy) + 1.0)
     fraction = 1.0 if turn <= turn_cap else turn_cap / turn
     for _ in range(_MOST_HALVINGS):
+        trial.turn[0] = state.turn[0]
         move(state, step, fraction, turn, trial.angles)
         accepted = False
         trial_energy = energy

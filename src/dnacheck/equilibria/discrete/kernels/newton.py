@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
+from dnacheck.equilibria.boundary_kernels import Boundary
 from dnacheck.equilibria.discrete.kernels.kkt import (
     FIRST_SHIFT,
     MOST_SHIFTS,
@@ -90,10 +91,13 @@ def newton(
     angles: Any,
     multipliers: Any,
     steps: Any,
+    boundary: Boundary,
     limits: NewtonLimits,
     figures: Any,
 ) -> int:
-    """Move ``angles`` (N, c) and ``multipliers`` (6,) to a closed equilibrium, in place.
+    """Move ``angles`` (N, c) and ``multipliers`` (6,) to an equilibrium of a boundary, in place.
+
+    Multipliers are components in the target's frame; those of free components are minus the loads.
 
     Each iteration factorises the Hessian of the Lagrangian. A shift that penalises the rotation
     of frames (see :func:`factorise`) is raised until the projected Hessian is positive (only with
@@ -102,17 +106,17 @@ def newton(
     it. Multipliers that are all zero are estimated first. A saddle, with ``minima_only``, is left
     along its direction of least curvature.
 
-    ``figures`` (8,) receives energy, residual, closure residual, the number of negative
-    eigenvalues of the projected Hessian (round-off apart), log |det KKT|, iterations, the weakest
-    pivot and the number of eigenvalues that are zero to round-off. Every exit has a code; no loop
-    is unbounded.
+    ``figures`` (8,) receives energy (less the work of loads), residual, closure residual, the
+    number of negative eigenvalues of the projected Hessian (round-off apart), log |det KKT|,
+    iterations, the weakest pivot and the number of eigenvalues that are zero to round-off. Every
+    exit has a code; no loop is unbounded.
     """
     stiffness = steps.stiffness
     tolerance, max_iterations = limits.tolerance, limits.max_iterations
     turn_cap, minima_only = limits.turn_cap, limits.minima_only
     n = angles.shape[0]
-    state = new_state(steps)
-    trial = new_state(steps)
+    state = new_state(steps, boundary)
+    trial = new_state(steps, boundary)
     factors = new_factors(steps)
     small = np.empty((6, 7))
     step = np.empty(angles.shape)
@@ -129,15 +133,21 @@ def newton(
     escapes = 0
 
     state.angles[:] = angles
+    for s in range(n):
+        state.turn[0] += angles[s, 0]
     energy = evaluate(state, steps)
     unknown = True
     for i in range(6):
-        unknown = unknown and multipliers[i] == 0.0
+        if boundary.fixed[i]:
+            unknown = unknown and multipliers[i] == 0.0
+        else:
+            multipliers[i] = -boundary.loads[i]
     if unknown:
         residuals(state, multipliers, slope)
         negatives, _, _ = solve_kkt(state, steps, 0.0, multipliers, factors, small, slope, change)
         if negatives >= 0:
-            multipliers[:] = change
+            for i in range(6):
+                multipliers[i] += change[i]
     code = ITERATION_LIMIT
     for iteration in range(max_iterations + 1):
         stationarity, worst = residuals(state, multipliers, slope)
@@ -163,6 +173,7 @@ def newton(
             if shift < 0.0 or not least_stable(state, factors, small, step):
                 code = CONVERGED
                 break
+            trial.turn[0] = state.turn[0]
             move(state, step, _ESCAPE_TURN, 1.0, trial.angles)
             energy = evaluate(trial, steps)
             state, trial = trial, state

@@ -11,8 +11,8 @@ step it is
 
 with n = d x force + moment, where s_jk is the symmetric part of the derivative of a_k by coordinate
 j, c_k = (a_k x d) x force, and the mid-step frame's terms have its own axes m, the arm v in place
-of d, and no moment. The translations of a step, which are stiff, are eliminated before its angles, so
-each step costs operations with 3 x 3 matrices only.
+of d, and no moment. The translations of a step, which are stiff, are eliminated before its angles,
+so each step costs operations with 3 x 3 matrices only.
 """
 
 from __future__ import annotations

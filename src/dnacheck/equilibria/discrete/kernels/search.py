@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from dnacheck.equilibria.boundary_kernels import ring_boundary
 from dnacheck.equilibria.discrete.kernels.newton import (
     CONVERGED,
     ENERGY,
@@ -87,7 +88,7 @@ def minimum_from_circle(
     fill_start(steps, link, register, angles)
     multipliers[:] = 0.0
     figures[:] = 0.0
-    code = newton(angles, multipliers, steps, limits, figures)
+    code = newton(angles, multipliers, steps, ring_boundary(), limits, figures)
     return code == CONVERGED and figures[NEGATIVES] == 0
 
 

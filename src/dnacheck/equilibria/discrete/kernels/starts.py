@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from dnacheck.equilibria.boundary_kernels import ring_boundary
 from dnacheck.equilibria.discrete.kernels.closure import linearise
 from dnacheck.equilibria.discrete.kernels.factorisation import back_substitute, eliminate
 from dnacheck.equilibria.discrete.kernels.kkt import positive_shift
@@ -106,7 +107,7 @@ def _roll_energy(ground: Any, stiffness: Any, form: int, link: int, quadratic: A
     n = ground.shape[0]
     mean = np.zeros((n, 3, 3))
     mean_steps = HingeSteps(ground, mean, form)
-    state = new_state(mean_steps)
+    state = new_state(mean_steps, ring_boundary())
     angles, gradient = state.angles, state.gradient
     fill_circle(ground, form, link, 0.0, angles)
     linearise(angles, form, state.centres, state.frames, state.axes, state.halves)

@@ -16,12 +16,12 @@ import numpy as np
 from numba import njit
 from numba.extending import overload
 
+from dnacheck.equilibria.boundary_kernels import Boundary, end_residual, place_start
 from dnacheck.equilibria.discrete.kernels.closure import (
     closure_jacobian,
-    closure_residual,
     energy_gradient,
     lagrangian_gradient,
-    linearise,
+    linearise_placed,
 )
 from dnacheck.equilibria.discrete.kernels.factorisation import (
     FACTOR_WIDTH,
@@ -57,7 +57,10 @@ class HingeState(NamedTuple):
     angles, gradient : ndarray, shape (N, 3)
         Coordinates, and the energy's gradient by them.
     closure : ndarray, shape (6,)
-        Closure residual.
+        Residual of the boundary, zero for free components.
+    boundary : Boundary
+    turn : ndarray, shape (1,)
+        Angle of the end about a target's d3 that carries a torque.
     centres, frames, axes, halves
         See :func:`dnacheck.equilibria.discrete.kernels.closure.linearise`.
     form : int
@@ -67,6 +70,8 @@ class HingeState(NamedTuple):
     angles: Any
     gradient: Any
     closure: Any
+    boundary: Boundary
+    turn: Any
     centres: Any
     frames: Any
     axes: Any
@@ -82,7 +87,10 @@ class RigidState(NamedTuple):
     angles, gradient : ndarray, shape (N, 6)
         Coordinates in the order of ``RIGID_COORDINATES``, and the energy's gradient by them.
     closure : ndarray, shape (6,)
-        Closure residual.
+        Residual of the boundary, zero for free components.
+    boundary : Boundary
+    turn : ndarray, shape (1,)
+        Angle of the end about a target's d3 that carries a torque.
     kinematics : RigidKinematics
     scales : ndarray, shape (N, 3)
         By what the residuals of the translations count beside those of the angles: the root of
@@ -93,6 +101,8 @@ class RigidState(NamedTuple):
     angles: Any
     gradient: Any
     closure: Any
+    boundary: Boundary
+    turn: Any
     kinematics: Any
     scales: Any
 
@@ -121,33 +131,41 @@ def by_kind(hinge: Callable[..., Any], rigid: Callable[..., Any]) -> Callable[..
 
 
 @njit(cache=True, nogil=True)
-def _new_hinge_state(steps: HingeSteps) -> HingeState:
+def _new_hinge_state(steps: HingeSteps, boundary: Boundary) -> HingeState:
     n = steps.ground.shape[0]
-    return HingeState(
+    state = HingeState(
         np.empty((n, 3)),
         np.empty((n, 3)),
         np.empty(6),
+        boundary,
+        np.zeros(1),
         np.empty((n + 1, 3)),
         np.empty((n + 1, 3, 3)),
         np.empty((n, 3, 3)),
         np.empty((n if steps.form != 0 else 0, 5, 3)),
         steps.form,
     )
+    place_start(boundary, state.centres[0], state.frames[0])
+    return state
 
 
 @njit(cache=True, nogil=True)
-def _new_rigid_state(steps: RigidSteps) -> RigidState:
+def _new_rigid_state(steps: RigidSteps, boundary: Boundary) -> RigidState:
     n = steps.ground.shape[0]
     scales = np.empty((n, 3))
     for s in range(n):
         bend = 0.5 * (steps.stiffness[s, 1, 1] + steps.stiffness[s, 2, 2])
         for j in range(3):
             scales[s, j] = min(1.0, math.sqrt(bend / steps.stiffness[s, 3 + j, 3 + j]))
-    return RigidState(np.empty((n, 6)), np.empty((n, 6)), np.empty(6), new_kinematics(n), scales)
+    kinematics = new_kinematics(n)
+    place_start(boundary, kinematics.centres[0], kinematics.frames[0])
+    return RigidState(
+        np.empty((n, 6)), np.empty((n, 6)), np.empty(6), boundary, np.zeros(1), kinematics, scales
+    )
 
 
 new_state = by_kind(_new_hinge_state, _new_rigid_state)
-"""State with room for the shape of ``steps``."""
+"""State with room for the shape of ``steps``, placed for a boundary: (steps, boundary)."""
 
 
 @njit(cache=True, nogil=True)
@@ -166,20 +184,33 @@ new_factors = by_kind(_hinge_factors, _rigid_factors)
 
 @njit(cache=True, nogil=True)
 def _evaluate_hinges(state: HingeState, steps: HingeSteps) -> float:
-    linearise(state.angles, state.form, state.centres, state.frames, state.axes, state.halves)
-    closure_residual(state.centres, state.frames, state.closure)
-    return energy_gradient(state.angles, steps.ground, steps.stiffness, state.gradient)
+    linearise_placed(
+        state.angles, state.form, state.centres, state.frames, state.axes, state.halves
+    )
+    n = state.angles.shape[0]
+    work = end_residual(
+        state.boundary, state.centres[n], state.frames[n], state.turn, state.closure
+    )
+    return energy_gradient(state.angles, steps.ground, steps.stiffness, state.gradient) - work
 
 
 @njit(cache=True, nogil=True)
 def _evaluate_rigid(state: RigidState, steps: RigidSteps) -> float:
     linearise_rigid(state.angles, state.kinematics)
-    closure_residual(state.kinematics.centres, state.kinematics.frames, state.closure)
-    return rigid_energy_gradient(state.angles, steps.ground, steps.stiffness, state.gradient)
+    n = state.angles.shape[0]
+    work = end_residual(
+        state.boundary,
+        state.kinematics.centres[n],
+        state.kinematics.frames[n],
+        state.turn,
+        state.closure,
+    )
+    energy = rigid_energy_gradient(state.angles, steps.ground, steps.stiffness, state.gradient)
+    return energy - work
 
 
 evaluate = by_kind(_evaluate_hinges, _evaluate_rigid)
-"""Fill a ``state`` from its angles and ``steps``; returns the energy."""
+"""Fill a ``state`` from its angles and ``steps``; returns the energy less the work of loads."""
 
 
 @njit(cache=True, nogil=True)
