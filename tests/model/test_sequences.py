@@ -1,4 +1,4 @@
-"""Sequences, molecules and targets: what is accepted, what is refused and how."""
+"""Sequences and molecules: what is accepted, what is refused and how."""
 
 import csv
 
@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from dnacheck.model.a_tracts import automatic_regions, parse_regions, tract_regions
 from dnacheck.model.data_files import data_directory
-from dnacheck.model.molecules import embedded, embedded_names, read_fasta, read_target
+from dnacheck.model.molecules import embedded, embedded_names
 from dnacheck.model.sequence import STEP_NAMES, Sequence, parse_sequence
 from dnacheck.numerics.outcome import InputError
 
@@ -84,35 +84,3 @@ def test_tract_rule_parts_distant_tracts_and_stays_inside():
 def test_bad_regions_are_refused(text):
     with pytest.raises(InputError, match="A-tract region"):
         parse_regions(text, 20)
-
-
-def test_fasta_gives_all_records_and_names_the_bad_one(tmp_path):
-    path = tmp_path / "m.fasta"
-    path.write_text(">a first\nACGTACGT\nACGT\n>b\nACGTXACGTACGT\n>\nTTTTTTTTTTTT\n")
-    first, bad, last = read_fasta(path)
-    assert (first.name, first.sequence.letters) == ("a", "ACGTACGTACGT")
-    assert "sequence 'b', position 5: 'X'" in str(bad)
-    assert last.name == "record 3"
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [(b"", "no FASTA record"), (b"ACGT\n", "FASTA"), (b"\xff\xfe>\x00", "not a text file")],
-)
-def test_files_that_are_no_fasta(tmp_path, content, message):
-    path = tmp_path / "m.fasta"
-    path.write_bytes(content)
-    with pytest.raises(InputError, match=message):
-        list(read_fasta(path))
-
-
-def test_targets():
-    assert next(read_target("11t15")) == embedded("11T15")
-    assert next(read_target("acgtacgtacgt")).sequence.letters == "ACGTACGTACGT"
-    for target, message in (
-        ("12X99", "neither an embedded molecule"),
-        ("missing.fasta", "missing.fasta"),
-        ("foo", "position 1: 'F'"),
-    ):
-        with pytest.raises(InputError, match=message):
-            list(read_target(target))

@@ -15,17 +15,15 @@ import pytest
 
 from dnacheck.cyclization.laplace.isolated import laplace_log_j
 from dnacheck.equilibria.discrete.search import find_rings
+from dnacheck.io.sequences import SequenceSource
 from dnacheck.model.chain import build_chain
 from dnacheck.model.parameters import load_parameters
-from dnacheck.model.sequence import parse_sequence
 from dnacheck.numerics.outcome import InputError
 from dnacheck.scan.scan import (
     COLUMNS,
     STATUS_FOUND,
     STATUS_FREE,
     ScanOptions,
-    fasta_records,
-    fingerprint,
     scan,
     scan_row,
     state_path,
@@ -58,10 +56,10 @@ def test_rows_equal_the_full_search(library, tmp_path):
     rows = rows_of(output)
     assert summary.rows == len(rows) == 40
     assert tuple(rows[0]) == COLUMNS
-    for row, (name, letters) in zip(rows, fasta_records(library), strict=True):
-        search = find_rings(build_chain(parse_sequence(letters, name)))
-        assert row["name"] == name
-        assert int(row["n_bp"]) == len(letters)
+    for row, record in zip(rows, SequenceSource(library).records(), strict=True):
+        search = find_rings(build_chain(record.molecule()))
+        assert row["name"] == record.name
+        assert int(row["n_bp"]) == len(record.letters)
         assert row["status"] == STATUS_FOUND
         assert int(row["link"]) == search.lowest.link
         assert float(row["energy_reduced"]) == pytest.approx(search.lowest.energy, abs=1e-7)
@@ -75,8 +73,8 @@ def test_model_options_reach_the_rows(library, tmp_path):
     default, stiff = tmp_path / "a.csv", tmp_path / "b.csv"
     scan(library, default)
     scan(library, stiff, ScanOptions({"twist_ratio": 0.6, "angles": "trifonov"}))
-    name, letters = next(fasta_records(library))
-    chain = build_chain(parse_sequence(letters, name), angles="trifonov", twist_ratio=0.6)
+    molecule = next(SequenceSource(library).molecules())
+    chain = build_chain(molecule, angles="trifonov", twist_ratio=0.6)
     assert float(rows_of(stiff)[0]["energy_reduced"]) == pytest.approx(
         find_rings(chain).lowest.energy, abs=1e-7
     )
@@ -104,6 +102,9 @@ def test_bad_records_are_rows_and_the_scan_goes_on(tmp_path):
     assert "position 5: 'N'" in rows[1]["status"]
     assert rows[1]["minus_lnJ"] == rows[1]["energy_RT"] == ""
     assert summary.failed_rows == 4
+    assert summary.ok_rows == 3
+    assert sum(summary.reasons.values()) == 4
+    assert summary.reasons["'N' is not one of A, C, G, T"] == 1
     assert rows[0]["energy_RT"] == rows[6]["energy_RT"]
 
 
@@ -193,10 +194,10 @@ def test_a_foreign_file_is_not_overwritten(library, tmp_path):
 
 def test_input_errors(tmp_path):
     with pytest.raises(InputError, match="check the path"):
-        fingerprint(tmp_path / "absent.fasta")
+        scan(tmp_path / "absent.fasta", tmp_path / "out.csv")
     empty = tmp_path / "empty.fasta"
     empty.write_text("no header\n")
-    with pytest.raises(InputError, match="no FASTA record"):
+    with pytest.raises(InputError, match="line 1: 'no header' stands before the first header"):
         scan(empty, tmp_path / "out.csv")
     source = random_fasta(tmp_path / "one.fasta", 1, 4)
     with pytest.raises(InputError, match="cannot write"):
@@ -205,11 +206,18 @@ def test_input_errors(tmp_path):
         ScanOptions(threads=0)
 
 
-def test_records_are_counted_whatever_the_line_ends(tmp_path):
-    for number, end in enumerate(("\n", "\r\n")):
-        path = tmp_path / f"{number}.fasta"
-        path.write_bytes(f">a{end}ACGT{end}AC{end}>b{end}{end}>c{end}GT".encode())
-        assert fingerprint(path)[1] == len(list(fasta_records(path))) == 3
+def test_reasons_are_counted_over_all_rows_also_those_from_before(tmp_path):
+    source, output = tmp_path / "bad.fasta", tmp_path / "out.csv"
+    source.write_text(">a\nACGTNACGTACGT\n>b\nACGNACGTACGT\n>c\nACGT\n>d\nACGTAC\n>e\n\n")
+    expected = {
+        "'N' is not one of A, C, G, T": 2,
+        "base pairs are too few for a ring; give at least 10": 2,
+        "it is empty; give at least 10 bases": 1,
+    }
+    for resumed in (0, 5):
+        summary = scan(source, output)
+        assert (summary.rows, summary.resumed_rows, summary.ok_rows) == (5, resumed, 0)
+        assert summary.reasons == expected
 
 
 def test_state_names_what_the_rows_do_not(library, tmp_path):
@@ -218,7 +226,7 @@ def test_state_names_what_the_rows_do_not(library, tmp_path):
     state = json.loads(state_path(output).read_text())
     assert state["twist_ratio"] == 0.8
     assert state["records"] == 40
-    assert state["input_sha256"] == fingerprint(library)[0]
+    assert state["input_sha256"] == SequenceSource(library).digest
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs SIGKILL")

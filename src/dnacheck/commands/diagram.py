@@ -121,8 +121,8 @@ def _components(
     from dnacheck.equilibria.continuation.follow import Bounds
     from dnacheck.equilibria.continuation.options import ContinuationOptions
     from dnacheck.equilibria.continuation.parameters import perfect_rod
+    from dnacheck.io.sequences import read_one
     from dnacheck.model.chain import PERSISTENCE_LENGTH_A, RISE_A, TWIST_RATIO, build_chain
-    from dnacheck.model.molecules import read_target
     from dnacheck.model.rod import RodOptions, build_rod
     from dnacheck.numerics.outcome import InputError
 
@@ -142,13 +142,7 @@ def _components(
         if search:
             raise InputError("the perfect diagram is connected: leave out --components")
         return (diagram.perfect_diagram(rod, 0.5 if alpha is None else alpha, limits, options),)
-    molecules = list(read_target(target))
-    if len(molecules) != 1:
-        raise InputError(f"a diagram is of one molecule, '{target}' holds {len(molecules)}")
-    molecule = molecules[0]
-    if isinstance(molecule, InputError):
-        raise molecule
-    chain = build_chain(molecule, **model.chain_arguments())
+    chain = build_chain(read_one(target, "a diagram"), **model.chain_arguments())
     rod = build_rod(
         chain,
         RodOptions(

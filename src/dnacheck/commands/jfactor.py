@@ -24,6 +24,7 @@ from dnacheck.cyclization.methods import METHODS, method_named
 if TYPE_CHECKING:
     from dnacheck.cyclization.result import JFactor
 
+EXIT_BAD_INPUT = 2
 EXIT_NOT_CONVERGED = 3
 
 
@@ -68,17 +69,23 @@ def command(
     -ln J is the free energy of cyclization over RT.
     """
     from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
+    from dnacheck.io.sequences import read_target
     from dnacheck.model.chain import build_chain
-    from dnacheck.model.molecules import read_target
     from dnacheck.numerics.outcome import InputError, SolveError
 
     records: list[dict[str, Any]] = []
     good = True
     way = method_named(method)
     limit = math.inf if max_seconds is None else max_seconds
-    for molecule in read_target(target):
+    molecules = list(read_target(target))
+    if len(molecules) == 1 and isinstance(molecules[0], InputError):
+        raise molecules[0]
+    refused = False
+    for molecule in molecules:
         if isinstance(molecule, InputError):
-            raise molecule
+            note(str(molecule))
+            refused = True
+            continue
         began = time.perf_counter()
         chain = build_chain(molecule, **model.chain_arguments())
         try:
@@ -95,7 +102,7 @@ def command(
             if isinstance(link, int):
                 result = result.of_link(link, tolerance)
         except SolveError as error:
-            if run.json and not records:
+            if run.json and len(molecules) == 1:
                 raise
             note(str(error), run.quiet)
             good = False
@@ -108,7 +115,9 @@ def command(
             for warning in result.warnings:
                 note(f"{chain.name}: {warning}", run.quiet)
     if run.json:
-        print_json(records[0] if len(records) == 1 else {"results": records})
+        print_json(records[0] if len(molecules) == 1 else {"results": records})
+    if refused:
+        return EXIT_BAD_INPUT
     return None if good else EXIT_NOT_CONVERGED
 
 

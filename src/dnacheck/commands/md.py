@@ -139,17 +139,11 @@ def command(
     compared with the discrete model. With --trajectory, frames and wedge angles are recovered
     from a bead trajectory of TARGET instead.
     """
+    from dnacheck.io.sequences import read_one
     from dnacheck.model.chain import build_chain
-    from dnacheck.model.molecules import read_target
     from dnacheck.numerics.outcome import InputError
 
-    molecules = list(read_target(target))
-    if len(molecules) != 1:
-        raise InputError(f"'{target}' holds {len(molecules)} records; give one molecule")
-    molecule = molecules[0]
-    if isinstance(molecule, InputError):
-        raise molecule
-    chain = build_chain(molecule, **model.chain_arguments())
+    chain = build_chain(read_one(target, "a bead-chain check"), **model.chain_arguments())
     for warning in chain.warnings:
         note(f"{chain.name}: {warning}", run.quiet)
     if trajectory is not None:

@@ -61,7 +61,7 @@ def command(
     TARGET is an embedded molecule such as 11T15, a sequence of A, C, G, T, or a FASTA file. The
     discrete base-pair model and the continuum rod are solved independently and compared.
     """
-    from dnacheck.model.molecules import read_target
+    from dnacheck.io.sequences import read_target
     from dnacheck.numerics.outcome import InputError
 
     molecules = list(read_target(target))

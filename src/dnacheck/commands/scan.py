@@ -14,9 +14,11 @@ from dnacheck.commands.common import (
 )
 from dnacheck.commands.output import note, print_json, progress
 
+EXIT_NOT_CONVERGED = 3
+
 
 @click.command(epilog="Example:  dnacheck scan library.fasta -o library.csv")
-@click.argument("fasta", type=click.Path(path_type=Path))
+@click.argument("fasta", metavar="FILE")
 @click.option(
     "-o",
     "--output",
@@ -28,19 +30,21 @@ from dnacheck.commands.output import note, print_json, progress
 @model_options
 @common_options
 def command(
-    fasta: Path, output: Path, restart: bool, model: ModelSettings, run: RunSettings
+    fasta: str, output: Path, restart: bool, model: ModelSettings, run: RunSettings
 ) -> int | None:
-    """Lowest ring and Laplace J factor of every record of FASTA.
+    """Lowest ring and Laplace J factor of every record of FILE: FASTA or GenBank, "-" for a pipe.
 
     A killed scan goes on where it stopped when the same command is given again, and ends with the
-    same file. A bad record is a row with its reason in the column "status".
+    same file. A bad record is a row with its reason in the column "status"; if no row is ok, the
+    exit code is 3.
     """
-    from dnacheck.scan.scan import ScanOptions, fingerprint, scan, state_path, summary_line
+    from dnacheck.io.sequences import SequenceSource
+    from dnacheck.scan.scan import ScanOptions, scan, state_path, summary_line
 
-    _, records = fingerprint(fasta)
+    source = SequenceSource(fasta)
     options = ScanOptions(model.chain_arguments(), run.threads)
-    with progress("sequences", records, run.quiet or run.json) as advance:
-        summary = scan(fasta, output, options, advance, restart)
+    with progress("sequences", source.count, run.quiet or run.json) as advance:
+        summary = scan(source, output, options, advance, restart)
     if run.json:
         print_json(
             {
@@ -49,9 +53,11 @@ def command(
                 "rows": summary.rows,
                 "resumed_rows": summary.resumed_rows,
                 "failed_rows": summary.failed_rows,
+                "ok_rows": summary.ok_rows,
+                "reasons": summary.reasons,
                 "seconds": summary.seconds,
             }
         )
     else:
         note(summary_line(summary, output), run.quiet)
-    return None
+    return None if summary.ok_rows else EXIT_NOT_CONVERGED

@@ -102,8 +102,8 @@ def command(
     """
     from dnacheck.equilibria.continuation.figures import sweep_data
     from dnacheck.equilibria.continuation.twist_ratio import sweep_continuum, sweep_discrete
+    from dnacheck.io.sequences import read_target
     from dnacheck.model.chain import build_chain
-    from dnacheck.model.molecules import read_target
     from dnacheck.model.rod import RodOptions, build_rod
     from dnacheck.numerics.outcome import InputError
 

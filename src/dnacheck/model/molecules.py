@@ -1,4 +1,4 @@
-"""Molecules by name, by letters or from a FASTA file."""
+"""Molecules, and the eleven that are embedded; files are read by :mod:`dnacheck.io.sequences`."""
 
 from __future__ import annotations
 
@@ -38,6 +38,11 @@ def _embedded() -> dict[str, Molecule]:
     return molecules
 
 
+def is_embedded(name: str) -> bool:
+    """Whether a name, in upper or lower case, is that of an embedded molecule."""
+    return name.upper() in _embedded()
+
+
 def embedded_names() -> tuple[str, ...]:
     """Names of the eleven molecules of Tables II and III, in the order of those tables."""
     return tuple(_embedded())
@@ -63,59 +68,3 @@ def _records(path: Path) -> Iterator[tuple[str, str]]:
 
     with path.open(encoding="utf-8") as handle:
         yield from SimpleFastaParser(handle)
-
-
-def read_fasta(path: Path) -> Iterator[Molecule | InputError]:
-    """Molecules of a FASTA file in order, one at a time; a bad record comes as its error.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, is not text, or holds no record.
-    """
-    found = False
-    try:
-        for number, (header, letters) in enumerate(_records(path), start=1):
-            found = True
-            name = header.split()[0] if header.split() else f"record {number}"
-            try:
-                yield Molecule(parse_sequence(letters, name))
-            except InputError as error:
-                yield error
-    except OSError as error:
-        raise InputError(f"file '{path}': {error.strerror or error}; check the path") from None
-    except UnicodeDecodeError:
-        raise InputError(f"file '{path}': not a text file; give a FASTA file") from None
-    except ValueError as error:
-        raise InputError(f"file '{path}': not FASTA ({error}); records start with '>'") from None
-    if not found:
-        raise InputError(f"file '{path}': no FASTA record; a record starts with a line '>name'")
-
-
-def read_target(target: str) -> Iterator[Molecule | InputError]:
-    """Molecules that a command-line TARGET names: embedded name, FASTA file or literal letters.
-
-    Raises
-    ------
-    InputError
-        The target is none of these, or its file cannot be read.
-    """
-    if target.upper() in _embedded():
-        yield embedded(target)
-        return
-    path = Path(target)
-    looks_like_path = "/" in target or "." in target or "\\" in target
-    try:
-        is_file = bool(target.strip()) and path.exists()
-    except OSError:
-        is_file = False
-    if is_file or looks_like_path:
-        yield from read_fasta(path)
-    elif not re.fullmatch(r"[A-Za-z\s]*", target):
-        names = ", ".join(embedded_names())
-        raise InputError(
-            f"target '{target}' is neither an embedded molecule ({names}), nor a file, "
-            "nor a sequence of A, C, G, T"
-        )
-    else:
-        yield Molecule(parse_sequence(target, "sequence"))

@@ -1,4 +1,4 @@
-"""Lowest ring and Laplace J factor of every record of a FASTA file, resumable and in order.
+"""Lowest ring and Laplace J factor of every record of a sequence file, resumable and in order.
 
 Rows are appended to the CSV file in the order of the input; a state file beside it (its name with
 ``.state.json``) holds the settings and the fingerprint of the input. A scan that was killed at any
@@ -14,9 +14,10 @@ import io
 import json
 import math
 import os
+import re
 import time
-from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections import Counter, deque
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from itertools import islice
@@ -29,6 +30,7 @@ from dnacheck import __version__
 from dnacheck.cyclization.laplace.isolated import log_prefactor
 from dnacheck.equilibria.discrete.search import candidate_links
 from dnacheck.io.files import atomic_write
+from dnacheck.io.sequences import Record, SequenceSource
 from dnacheck.model.chain import build_chain
 from dnacheck.model.parameters import ParameterSet, load_parameters
 from dnacheck.model.sequence import parse_sequence
@@ -36,6 +38,7 @@ from dnacheck.numerics.outcome import InputError
 from dnacheck.scan import kernels as sk
 
 COLUMNS = ("name", "n_bp", "link", "energy_RT", "energy_reduced", "minus_lnJ", "status")
+_STATUS = COLUMNS.index("status")
 STATUS_FOUND = "ok"
 STATUS_NO_RING = "no stable ring found at any link searched"
 STATUS_FREE = "free register, no Laplace value; use dnacheck jfactor"
@@ -44,6 +47,7 @@ _BLOCK = 8
 """Records handed to a thread at a time."""
 _BLOCKS_IN_FLIGHT = 4
 """Blocks per thread read ahead; bounds the memory."""
+_REASONS_NAMED = 5
 _SYNC_SECONDS = 2.0
 """Longest time for which finished rows may be lost by a power failure."""
 _LONGEST = 100_000
@@ -82,60 +86,21 @@ class ScanSummary:
     failed_rows : int
         Rows computed now whose status is not ``ok``.
     seconds : float
+    reasons : mapping
+        Over all rows that are not ``ok``, how often each reason occurs, the most frequent first;
+        names, positions and lengths are left out of the reason.
     """
 
     rows: int
     resumed_rows: int
     failed_rows: int
     seconds: float
+    reasons: Mapping[str, int] = field(default_factory=dict)
 
-
-def fasta_records(path: Path) -> Iterator[tuple[str, str]]:
-    """Name and letters of each record, in order; nothing is checked.
-
-    Bytes that are not UTF-8 become letters that no sequence has, so that they spoil their own
-    record and no other.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read or is not FASTA.
-    """
-    from Bio.SeqIO.FastaIO import SimpleFastaParser
-
-    try:
-        with path.open(encoding="utf-8", errors="replace") as handle:
-            for number, (header, letters) in enumerate(SimpleFastaParser(handle), start=1):
-                words = header.split()
-                yield (words[0] if words else f"record {number}"), letters
-    except OSError as error:
-        raise InputError(f"file '{path}': {error.strerror or error}; check the path") from None
-    except ValueError as error:
-        raise InputError(f"file '{path}': not FASTA ({error}); records start with '>'") from None
-
-
-def fingerprint(path: Path) -> tuple[str, int]:
-    """SHA-256 of a file and its number of FASTA records.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read or holds no record.
-    """
-    digest = hashlib.sha256()
-    records = 0
-    last = b"\n"
-    try:
-        with path.open("rb") as handle:
-            while chunk := handle.read(1 << 20):
-                digest.update(chunk)
-                records += (last + chunk).count(b"\n>") + (last + chunk).count(b"\r>")
-                last = chunk[-1:]
-    except OSError as error:
-        raise InputError(f"file '{path}': {error.strerror or error}; check the path") from None
-    if not records:
-        raise InputError(f"file '{path}': no FASTA record; a record starts with a line '>name'")
-    return digest.hexdigest(), records
+    @property
+    def ok_rows(self) -> int:
+        """Rows of the finished file whose status is ``ok``."""
+        return self.rows - sum(self.reasons.values())
 
 
 def scan_row(name: str, letters: str, arguments: Mapping[str, Any]) -> list[str]:
@@ -181,9 +146,16 @@ def _text(rows: list[list[str]]) -> bytes:
     return buffer.getvalue().encode()
 
 
-def _block_text(block: list[tuple[str, str]], arguments: Mapping[str, Any]) -> tuple[bytes, int]:
-    rows = [scan_row(name, letters, arguments) for name, letters in block]
-    return _text(rows), sum(row[-1] != STATUS_FOUND for row in rows)
+def _block_text(block: list[Record], arguments: Mapping[str, Any]) -> tuple[bytes, list[str]]:
+    """Rows of a block as text, and the statuses that are not ``ok``."""
+    rows = [scan_row(record.name, record.letters, arguments) for record in block]
+    return _text(rows), [row[_STATUS] for row in rows if row[_STATUS] != STATUS_FOUND]
+
+
+def _reason(status: str) -> str:
+    """A status without what differs from record to record."""
+    reason = re.sub(r"^sequence '.*?'(, position \d+)?: ", "", status)
+    return re.sub(r"^\d+ base pairs", "base pairs", reason)
 
 
 def state_path(output: Path) -> Path:
@@ -191,9 +163,7 @@ def state_path(output: Path) -> Path:
     return output.with_name(output.name + ".state.json")
 
 
-def _settings(
-    source: Path, records: int, digest: str, arguments: Mapping[str, Any]
-) -> dict[str, Any]:
+def _settings(source: SequenceSource, arguments: Mapping[str, Any]) -> dict[str, Any]:
     plain = {
         key: value if isinstance(value, str | int | float | type(None)) else str(value)
         for key, value in arguments.items()
@@ -203,9 +173,9 @@ def _settings(
     table = load_parameters(table) if isinstance(table, str) else table
     return {
         "version": __version__,
-        "input": source.name,
-        "input_sha256": digest,
-        "records": records,
+        "input": Path(source.name).name,
+        "input_sha256": source.digest,
+        "records": source.count,
         "angles": table.name,
         "angles_sha256": _angle_digest(table),
         **plain,
@@ -220,8 +190,8 @@ def _angle_digest(table: ParameterSet) -> str:
     return digest.hexdigest()
 
 
-def _whole_rows(handle: BinaryIO, source: Path) -> tuple[int, int]:
-    """Rows of an unfinished output that agree with the input, and the bytes they take.
+def _whole_rows(handle: BinaryIO, source: SequenceSource) -> tuple[int, int, list[str]]:
+    """Rows of an unfinished output that agree with the input, their bytes, and what failed.
 
     A row counts if it ends in a newline, has all columns, and names the record at its place; what
     follows the last such row (half a line, blocks of zeros after a power failure) does not.
@@ -229,9 +199,10 @@ def _whole_rows(handle: BinaryIO, source: Path) -> tuple[int, int]:
     header = _text([list(COLUMNS)])
     handle.seek(0)
     if handle.readline() != header:
-        return 0, 0
+        return 0, 0, []
     rows, size = 0, len(header)
-    records = fasta_records(source)
+    failures: list[str] = []
+    records = source.records()
     pending = b""
     for line in handle:
         pending += line
@@ -244,18 +215,20 @@ def _whole_rows(handle: BinaryIO, source: Path) -> tuple[int, int]:
             cells = next(csv.reader(io.StringIO(pending.decode())))
         except (UnicodeDecodeError, csv.Error, StopIteration):
             break
-        if record is None or len(cells) != len(COLUMNS) or cells[0] != record[0]:
+        if record is None or len(cells) != len(COLUMNS) or cells[0] != record.name:
             break
         rows += 1
+        if cells[_STATUS] != STATUS_FOUND:
+            failures.append(cells[_STATUS])
         size += len(pending)
         pending = b""
-    return rows, size
+    return rows, size, failures
 
 
 def _opened(
-    source: Path, output: Path, settings: dict[str, Any], restart: bool
-) -> tuple[BinaryIO, int]:
-    """The output ready for the next row, and how many rows it has."""
+    source: SequenceSource, output: Path, settings: dict[str, Any], restart: bool
+) -> tuple[BinaryIO, int, list[str]]:
+    """The output ready for the next row, how many rows it has, and which of them failed."""
     state = state_path(output)
     try:
         old = json.loads(state.read_text()) if state.exists() and not restart else None
@@ -280,27 +253,27 @@ def _opened(
         raise InputError(
             f"cannot write '{output}': {error.strerror}; name a file in a writable directory"
         ) from error
-    rows, size = (0, 0) if fresh else _whole_rows(handle, source)
+    rows, size, failures = (0, 0, []) if fresh else _whole_rows(handle, source)
     handle.seek(size)
     handle.truncate()
     if size == 0:
         handle.write(_text([list(COLUMNS)]))
-    return handle, rows
+    return handle, rows, failures
 
 
 def scan(
-    source: Path,
+    source: Path | str | SequenceSource,
     output: Path,
     options: ScanOptions | None = None,
     progress: Callable[[int], None] | None = None,
     restart: bool = False,
 ) -> ScanSummary:
-    """Scan a FASTA file into a CSV file, going on with an unfinished one.
+    """Scan a file of sequences into a CSV file, going on with an unfinished one.
 
     Parameters
     ----------
-    source : Path
-        FASTA file.
+    source : path or SequenceSource
+        FASTA or GenBank, as :class:`dnacheck.io.sequences.SequenceSource` reads it.
     output : Path
         CSV file with the columns :data:`COLUMNS`; J is Laplace's, summed over minima and links.
     progress : callable, optional
@@ -316,21 +289,22 @@ def scan(
     """
     options = options or ScanOptions()
     began = time.perf_counter()
-    if source.resolve() == output.resolve():
+    source = source if isinstance(source, SequenceSource) else SequenceSource(source)
+    if Path(source.name).resolve() == output.resolve():
         raise InputError(f"file '{output}' is the input; name another one for the output")
-    digest, records = fingerprint(source)
     arguments = dict(options.chain_arguments)
-    settings = _settings(source, records, digest, arguments)
+    settings = _settings(source, arguments)
     angles = arguments.get("angles", "trifonov2")
     arguments["angles"] = load_parameters(angles) if isinstance(angles, str) else angles
-    handle, resumed = _opened(source, output, settings, restart)
+    handle, resumed, failures = _opened(source, output, settings, restart)
+    reasons = Counter(map(_reason, failures))
     failed = 0
     done = resumed
     with handle:
         if progress is not None and resumed:
             progress(resumed)
-        pending: deque[tuple[Future[tuple[bytes, int]], int]] = deque()
-        stream = islice(fasta_records(source), resumed, None)
+        pending: deque[tuple[Future[tuple[bytes, list[str]]], int]] = deque()
+        stream = islice(source.records(), resumed, None)
         synced = time.perf_counter()
         with ThreadPoolExecutor(options.threads) as pool:
             try:
@@ -347,7 +321,8 @@ def scan(
                     handle.write(text)
                     handle.flush()
                     done += size
-                    failed += bad
+                    failed += len(bad)
+                    reasons.update(map(_reason, bad))
                     if progress is not None:
                         progress(size)
                     if time.perf_counter() - synced > _SYNC_SECONDS:
@@ -357,7 +332,8 @@ def scan(
                 for future, _ in pending:
                     future.cancel()
                 _sync(handle)
-    return ScanSummary(done, resumed, failed, time.perf_counter() - began)
+    seconds = time.perf_counter() - began
+    return ScanSummary(done, resumed, failed, seconds, dict(reasons.most_common()))
 
 
 def _sync(handle: BinaryIO) -> None:
@@ -373,6 +349,11 @@ def summary_line(summary: ScanSummary, output: Path) -> str:
     if summary.resumed_rows:
         text += f", {summary.resumed_rows} of them from before"
     text += f"; {new} now in {summary.seconds:.1f} s ({rate:.0f} a second)"
-    if summary.failed_rows:
-        text += f"; {summary.failed_rows} without a ring, see their status"
+    if summary.reasons:
+        text += f"; {summary.rows - summary.ok_rows} not ok"
+        named = list(summary.reasons.items())
+        text += f" ({'; '.join(f'{count}: {reason}' for reason, count in named[:_REASONS_NAMED])}"
+        if len(named) > _REASONS_NAMED:
+            text += f"; {len(named) - _REASONS_NAMED} more reasons"
+        text += ")"
     return text

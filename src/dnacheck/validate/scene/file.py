@@ -13,8 +13,9 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
+from dnacheck.io.sequences import SequenceSource
 from dnacheck.model.data_files import PARAMETER_SETS
-from dnacheck.model.molecules import Molecule, embedded, embedded_names, read_fasta
+from dnacheck.model.molecules import Molecule, embedded, embedded_names
 from dnacheck.model.parameters import load_parameters
 from dnacheck.model.sequence import parse_sequence
 from dnacheck.numerics.outcome import InputError
@@ -284,7 +285,7 @@ class _Reader:
 
 
 def _records(path: Path) -> list[Molecule | InputError]:
-    return list(read_fasta(path))
+    return list(SequenceSource(path).molecules())
 
 
 def random_molecules(wish: RandomMolecules) -> Iterator[Molecule]:
