@@ -103,7 +103,7 @@ def test_a_bad_record_is_named_and_the_rest_go_on(capsys, tmp_path):
         (["11T15", "--filter-width", "60"], "filter"),
         (["11T15", "--angles", "none-such"], "none-such"),
         (["11T15", "--a-tracts", "150..160"], "157"),
-        (["11T15", "--structure", "ring.xyz", "--model", "discrete"], ".pdb or .gro"),
+        (["11T15", "--structure", "ring.xyz", "--model", "discrete"], ".pdb, .gro or .cif"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(capsys, arguments, words):
@@ -147,7 +147,7 @@ def test_structure_file_of_an_open_chain_shows_the_gap(tmp_path):
 def test_structure_that_cannot_be_written_leaves_nothing(tmp_path):
     chain = build_chain(embedded("11T15"))
     centres, frames = chain_frames(chain.ground)
-    with pytest.raises(InputError, match="check the folder"):
+    with pytest.raises(InputError, match="there is no folder"):
         write_ring_structure(
             tmp_path / "missing" / "ring.pdb", centres, frames, chain.letters, 3.4, "x"
         )

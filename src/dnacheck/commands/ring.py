@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from dnacheck.model.chain import Chain
     from dnacheck.model.molecules import Molecule
 
+    Found = tuple[Chain, ContinuumRing | None, DiscreteRing | None]
+
 EXIT_BAD_INPUT = 2
 EXIT_NOT_CONVERGED = 3
 # Minima this close to the lowest, in RT, share the molecule with it.
@@ -42,7 +44,7 @@ _SOFT_RT = 5.0
     "--structure",
     type=click.Path(path_type=Path, dir_okay=False),
     default=None,
-    help="Write the lowest ring as a .pdb or .gro file.",
+    help="Write the lowest ring as a .pdb, .gro or .cif file, or one of these and .gz.",
 )
 @model_options
 @ring_options
@@ -79,7 +81,7 @@ def command(
             if isinstance(molecule, InputError):
                 note(str(molecule))
                 continue
-            record, converged = _solve(molecule, structure, model, ring, continuum)
+            record, converged, found = _solve(molecule, structure, model, ring, continuum)
             complete = complete and converged
             records.append(record)
             advance(1)
@@ -89,6 +91,8 @@ def command(
                 note(f"{record['target']}: {warning}", run.quiet)
     if run.json:
         print_json(records[0] if len(molecules) == 1 else {"target": target, "molecules": records})
+    if structure is not None:
+        _write(structure, *found)
     if len(good) < len(molecules):
         return EXIT_BAD_INPUT
     return None if complete else EXIT_NOT_CONVERGED
@@ -100,11 +104,15 @@ def _solve(
     model: ModelSettings,
     ring: RingSettings,
     continuum: ContinuumSettings,
-) -> tuple[dict[str, Any], bool]:
-    """The JSON record of one molecule, and whether every model asked for converged."""
+) -> tuple[dict[str, Any], bool, Found]:
+    """The JSON record of one molecule, whether every model asked for converged, and its rings."""
     from dnacheck.model.chain import build_chain
 
     chain = build_chain(molecule, **model.chain_arguments())
+    if structure is not None:
+        from dnacheck.io.structure import structure_file
+
+        structure_file(structure, chain.n_steps, chain.rise_A)
     warnings = list(chain.warnings)
     if chain.rigid and ring.model == "both":
         warnings.append("continuum: left out, for steps of six parameters have none yet")
@@ -128,8 +136,6 @@ def _solve(
             "energy_difference_percent": 100.0 * (smooth.energy / discrete.energy - 1.0),
             "rms_A": rms_difference(reconstruct(smooth).centres, discrete.centres, chain.rise_A),
         }
-    if structure is not None:
-        _write(structure, chain, smooth, discrete)
     record = {
         "target": molecule.name,
         "n_bp": chain.n_steps,
@@ -142,7 +148,7 @@ def _solve(
         "comparison": comparison,
         "warnings": warnings,
     }
-    return record, converged
+    return record, converged, (chain, smooth, discrete)
 
 
 def _discrete(
