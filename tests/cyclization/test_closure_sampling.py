@@ -68,7 +68,13 @@ def test_a_wrong_width_of_the_draws_is_caught():
     profile = register_profile(chain)
     good = sample_closure(profile, ClosureOptions(tolerance=0.008), seed=1)
     charts = tuple(
-        replace(chart, rings=tuple(replace(r, root=1.05 * r.root) for r in chart.rings))
+        replace(
+            chart,
+            rings=tuple(
+                replace(r, factors=r.factors._replace(root=1.05 * r.factors.root))
+                for r in chart.rings
+            ),
+        )
         for chart in profile.charts
     )
     wrong = sample_closure(replace(profile, charts=charts), ClosureOptions(tolerance=0.008), seed=1)
@@ -138,10 +144,11 @@ def test_links_add_up_to_j():
 
 def test_a_link_whose_weight_underflows_has_no_share():
     profile = register_profile(closed_ground_chain())
-    sampler = ClosureSampler(profile, ClosureOptions(), 1)
-    draws = sampler._round(4, 8, 0.0)
-    draws.log_weights[0, 0], draws.links[0, 0], draws.codes[0, 0] = -900.0, 99, COUNTED
-    result = sampler._result(draws, 0.0)
+    sampler = ClosureSampler(profile, ClosureOptions(first_batches=4, most_draws=1), 1)
+    draws = sampler.draw()
+    record = draws.record
+    record.log_weights[0, 0], record.links[0, 0], record.codes[0, 0] = -900.0, 99, COUNTED
+    result = sampler.result(draws, 0.0)
     assert math.isfinite(result.minus_lnJ)
     assert 99 not in [share.link for share in result.links]
 
@@ -167,7 +174,7 @@ def test_probes_count_what_hard_draws_leave_out():
 def test_draws_without_a_shape_count_as_zero():
     chain = rough_ring(20, 2, 2.5, 12)
     sampler = ClosureSampler(register_profile(chain), ClosureOptions(), 13)
-    draws = sampler._round(20, 8, 0.0)
+    draws = sampler.draw().record
     folded = draws.codes == NO_CROSSING
     assert folded.any()
     assert np.all(draws.log_weights[folded] == -math.inf)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from dnacheck.cyclization.closure.method import ClosureSampling
 from dnacheck.cyclization.half_chain.method import HalfChain
-from dnacheck.cyclization.method import Method, Run, held_rings_of
+from dnacheck.cyclization.method import Method, Run, register_profile_of
 from dnacheck.cyclization.result import Attempt, JFactor, JStatus
 from dnacheck.numerics.outcome import SolveError
 
@@ -40,7 +40,7 @@ class Auto(Method):
         from dnacheck.numerics.seeds import seed_sequence
 
         began = time.perf_counter()
-        profile = held_rings_of(target)
+        profile = register_profile_of(target)
         search = profile.search
         seeds = seed_sequence(run.rng).spawn(3)
         attempts: list[Attempt] = []

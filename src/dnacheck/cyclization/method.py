@@ -91,7 +91,7 @@ class Method(ABC):
         tolerance: float = DEFAULT_TOLERANCE,
         max_seconds: float = math.inf,
     ) -> JFactor:
-        """J factor of a chain, or of one whose rings or held rings are known already.
+        """J factor of a chain, or of one whose rings or register profile are known already.
 
         Parameters
         ----------
@@ -139,8 +139,8 @@ def rings_of(target: Target) -> RingSearch:
     return target if isinstance(target, RingSearch) else find_rings(target)
 
 
-def held_rings_of(target: Target) -> RegisterProfile:
-    """The held rings of a target, computed where they are not given."""
+def register_profile_of(target: Target) -> RegisterProfile:
+    """The register-constrained minima of a target, computed where they are not given."""
     from dnacheck.cyclization.laplace.register import RegisterProfile, register_profile
 
     return target if isinstance(target, RegisterProfile) else register_profile(target)

@@ -5,10 +5,13 @@ from __future__ import annotations
 import enum
 import html
 import math
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 from dnacheck.numerics.outcome import InputError, SolveError
+
+if TYPE_CHECKING:
+    from dnacheck.cyclization.gradient import LogJGradient
 
 PER_CUBIC_ANGSTROM_IN_MOLAR = 1660.539
 """One molecule per cubic ångström in mol/L, 1e27 Å^3/L over Avogadro's number."""
@@ -117,6 +120,8 @@ class JFactor:
         Why this method, where it was chosen.
     tried : tuple of Attempt
         What was tried before it, and it itself.
+    gradient : LogJGradient or None
+        Derivatives of ln J, where the method was asked for them.
     """
 
     target: str
@@ -134,6 +139,7 @@ class JFactor:
     status: JStatus = JStatus.CONVERGED
     reason: str = ""
     tried: tuple[Attempt, ...] = ()
+    gradient: LogJGradient | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         if math.isnan(self.minus_lnJ) or not self.stderr >= 0.0:
@@ -194,6 +200,7 @@ class JFactor:
             stderr=share.stderr,
             bias_bound=bias,
             links=(share,),
+            gradient=None,
         )
         if self.status is JStatus.CONVERGED and part.total_error > tolerance:
             return replace(part, status=JStatus.TOLERANCE_NOT_MET)

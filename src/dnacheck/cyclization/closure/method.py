@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+import time
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from dnacheck.cyclization.method import Method, Run, held_rings_of
+from dnacheck.cyclization.method import Method, Run, register_profile_of
 
 if TYPE_CHECKING:
     from dnacheck.cyclization.closure.sampling import ClosureOptions
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ClosureSampling(Method):
-    """Importance sampling of exactly closed shapes about the held rings.
+    """Importance sampling of exactly closed shapes about the register-constrained minima.
 
     Attributes
     ----------
@@ -25,12 +26,15 @@ class ClosureSampling(Method):
         Bound on the number of draws.
     probe_rate : float
         Fraction of draws that are searched for shapes not counted.
+    gradient : bool
+        Compute the derivatives of ln J too, :attr:`JFactor.gradient`.
     """
 
     first_batches: int = 20
     pairs_per_batch: int = 8
     most_draws: int = 400_000
     probe_rate: float = 0.1
+    gradient: bool = False
 
     def __post_init__(self) -> None:
         self.options(Run())
@@ -46,12 +50,29 @@ class ClosureSampling(Method):
         return ClosureOptions(
             tolerance=run.tolerance,
             max_seconds=run.max_seconds,
+            first_batches=self.first_batches,
+            pairs_per_batch=self.pairs_per_batch,
+            most_draws=self.most_draws,
+            probe_rate=self.probe_rate,
             threads=run.threads,
-            **asdict(self),
         )
 
     def run(self, target: Target, run: Run) -> JFactor:
+        if self.gradient:
+            return self.with_gradient(target, run)
         from dnacheck.cyclization.closure.sampling import ClosureSampler
 
-        sampler = ClosureSampler(held_rings_of(target), self.options(run), run.rng)
+        sampler = ClosureSampler(register_profile_of(target), self.options(run), run.rng)
         return sampler.sample(run.progress)
+
+    def with_gradient(self, target: Target, run: Run) -> JFactor:
+        """The same result, with its gradient from the same draws."""
+        from dnacheck.cyclization.closure.sampling import ClosureSampler
+        from dnacheck.cyclization.gradient import Moments
+
+        began = time.perf_counter()
+        profile = register_profile_of(target)
+        moments = Moments(profile.chain)
+        sampler = ClosureSampler(profile, self.options(run), run.rng)
+        result = sampler.result(sampler.draw(run.progress, moments), began)
+        return replace(result, gradient=moments.gradient())

@@ -1,10 +1,10 @@
 """Exact-closure importance sampling: J factors without a closure window.
 
-Shapes near every held ring (:mod:`dnacheck.cyclization.laplace.register`) are drawn from the
-Gaussian of Laplace's approximation, moved onto exact closure and weighted exactly; the mean weight
-multiplies the register-integrated Laplace J. What remains systematic is small and measured: the
-trapezoid rule over the register, links and registers left out, and shapes that a draw's fibre holds
-beyond the one counted (:mod:`dnacheck.cyclization.closure.kernels.draws`), which probes count
+Shapes near every register-constrained minimum (:mod:`dnacheck.cyclization.laplace.register`) are
+drawn from the Gaussian of Laplace's approximation, moved onto exact closure and weighted exactly;
+the mean weight multiplies the register-integrated Laplace J. What remains systematic is small and
+measured: the trapezoid rule over the register, links and registers left out, and shapes above a
+draw beyond the one counted (:mod:`dnacheck.cyclization.closure.kernels.draws`), which probes count
 without bias.
 """
 
@@ -19,8 +19,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dnacheck.cyclization.closure.kernels.draws import COUNTED, NO_CROSSING, draw_pairs
-from dnacheck.cyclization.laplace.constrained_minimum import HeldRing
+from dnacheck.cyclization.closure.kernels.draws import (
+    COUNTED,
+    NO_CROSSING,
+    DrawRecord,
+    Probes,
+    draw_pairs,
+)
+from dnacheck.cyclization.laplace.constrained_minimum import steps_in_RT
 from dnacheck.cyclization.laplace.register import RegisterProfile, register_profile
 from dnacheck.cyclization.result import JFactor, JStatus, link_shares
 from dnacheck.equilibria.discrete.search import RingSearch
@@ -52,7 +58,7 @@ class ClosureOptions:
     most_draws : int
         Bound on the number of draws.
     probe_rate : float
-        Fraction of draws whose fibres are searched for further closed shapes.
+        Fraction of draws that are searched for further closed shapes.
     threads : int
         Threads to use; no result depends on it.
     """
@@ -76,37 +82,35 @@ class ClosureOptions:
             raise InputError(f"probe_rate must lie between 0 and 1, not {self.probe_rate}")
 
 
-@dataclass(frozen=True)
-class _Slice:
-    """One held ring with all that drawing about it needs."""
-
-    ring: HeldRing
-    link: int
-    rivals: Array
-    log_mass: float
-
-
 @dataclass
-class _Draws:
-    """Draws so far; one row per pair."""
+class Draws:
+    """Draws so far; one row per pair.
 
-    log_weights: Array
-    codes: NDArray[np.int64]
-    links: NDArray[np.int64]
-    others: Array
-    corrections: Array
+    Attributes
+    ----------
+    record : DrawRecord
+        Its strains are empty unless they are asked for.
+    batch : ndarray, shape (pairs,)
+    unfinished : int
+        Probes that ended before they found a shape again.
+    """
+
+    record: DrawRecord
     batch: NDArray[np.int64]
     unfinished: int
 
-    def joined(self, more: _Draws) -> _Draws:
+    @property
+    def weights(self) -> Array:
+        """Weights (pairs, 2) relative to the Laplace value."""
+        weights: Array = np.exp(self.record.log_weights)
+        return weights
+
+    def joined(self, more: Draws) -> Draws:
         """These and ``more``, whose batches are numbered on."""
         offset = int(self.batch.max()) + 1 if self.batch.size else 0
-        return _Draws(
-            np.concatenate([self.log_weights, more.log_weights]),
-            np.concatenate([self.codes, more.codes]),
-            np.concatenate([self.links, more.links]),
-            np.concatenate([self.others, more.others]),
-            np.concatenate([self.corrections, more.corrections]),
+        pairs = zip(self.record, more.record, strict=True)
+        return Draws(
+            DrawRecord(*(np.concatenate(arrays) for arrays in pairs)),
             np.concatenate([self.batch, more.batch + offset]),
             self.unfinished + more.unfinished,
         )
@@ -118,9 +122,9 @@ class ClosureSampler:
     Parameters
     ----------
     profile : RegisterProfile
-        Held rings of the molecule.
+        Register-constrained minima of the molecule.
     seed : int or numpy.random.SeedSequence
-        One stream is spawned from it for every round and held ring.
+        One stream is spawned from it for every round and minimum.
     """
 
     def __init__(
@@ -130,38 +134,30 @@ class ClosureSampler:
         seed: Randomness = 0,
     ) -> None:
         self.profile, self.options = profile, options
-        chain = profile.chain
-        self.stiffness = np.ascontiguousarray(chain.energy_scale_RT * chain.stiffness)
-        self.covered = np.array([chart.link for chart in profile.charts], dtype=np.int64)
-        self.slices = [
-            _Slice(ring, chart.link, chart.rivals(ring), ring.log_density + math.log(chart.spacing))
-            for chart in profile.charts
-            for ring in chart.rings
-        ]
+        self.steps = steps_in_RT(profile.chain)
+        self.slices = profile.slices()
         masses = np.array([piece.log_mass for piece in self.slices])
         self.log_laplace = float(np.logaddexp.reduce(masses))
         self.cumulative = np.cumsum(np.exp(masses - self.log_laplace))
         self.sequence = seed_sequence(seed)
-        self.probe_mean, self.probe_root = np.zeros(6), np.zeros((6, 6))
-        self._set_probe_starts()
+        self.probes = Probes(0.0, np.zeros(6), np.zeros((6, 6)))
+        self.probes = self._probes()
 
-    def _set_probe_starts(self) -> None:
+    def _probes(self) -> Probes:
         """Centre and spread of the probes' random starts, from the corrections of a pilot."""
-        pilot = self._round(1, _PILOT_PAIRS, 0.0)
-        y = pilot.corrections.reshape(-1, 6)
+        rate = float(self.options.probe_rate)
+        y = self._round(1, _PILOT_PAIRS).record.corrections.reshape(-1, 6)
         y = y[np.isfinite(y).all(axis=1)]
         if len(y) < 2:
-            self.probe_root = np.diag([float(self.profile.chain.n_steps)] * 3 + [1.0] * 3)
-            return
-        self.probe_mean = y.mean(axis=0)
+            root = np.diag([float(self.profile.chain.n_steps)] * 3 + [1.0] * 3)
+            return Probes(rate, np.zeros(6), root)
         spread = y.std(axis=0)
         covariance = np.cov(y.T) if len(y) > 12 else np.diag(spread**2)
         # Wider than the corrections, because other crossings lie further out.
-        self.probe_root = 1.5 * np.linalg.cholesky(
-            covariance + np.diag((0.1 * spread) ** 2 + 1e-12)
-        )
+        root = 1.5 * np.linalg.cholesky(covariance + np.diag((0.1 * spread) ** 2 + 1e-12))
+        return Probes(rate, y.mean(axis=0), root)
 
-    def _round(self, batches: int, pairs: int, probe_rate: float) -> _Draws:
+    def _round(self, batches: int, pairs: int, strains: bool = False) -> Draws:
         """One round of independent batches, each spread systematically over the slices."""
         root = self.sequence.spawn(1)[0]
         offsets, *streams = root.spawn(1 + len(self.slices))
@@ -173,72 +169,37 @@ class ClosureSampler:
         order = np.argsort(chosen, kind="stable")
         counts = np.bincount(chosen, minlength=len(self.slices))
         total = batches * pairs
-        draws = _Draws(
-            np.empty((total, 2)),
-            np.empty((total, 2), dtype=np.int64),
-            np.empty((total, 2), dtype=np.int64),
-            np.empty((total, 2)),
-            np.empty((total, 2, 6)),
-            batch[order],
-            0,
+        record = DrawRecord(
+            log_weights=np.empty((total, 2)),
+            codes=np.empty((total, 2), dtype=np.int64),
+            links=np.empty((total, 2), dtype=np.int64),
+            others=np.empty((total, 2)),
+            corrections=np.empty((total, 2, 6)),
+            strains=np.empty((total if strains else 0, 2, *self.steps.ground.shape)),
         )
         bounds = np.concatenate([[0], np.cumsum(counts)])
 
         def work(index: int) -> int:
-            low, high = bounds[index], bounds[index + 1]
-            return self._draw(index, streams[index], draws, low, high, probe_rate)
+            part = slice(bounds[index], bounds[index + 1])
+            piece = self.slices[index]
+            return int(
+                draw_pairs(
+                    np.random.default_rng(streams[index]),
+                    self.steps,
+                    piece.centre,
+                    piece.minimum.factors,
+                    self.probes,
+                    DrawRecord(*(array[part] for array in record)),
+                )
+            )
 
         busy = [i for i in range(len(self.slices)) if counts[i]]
         if self.options.threads > 1 and len(busy) > 1:
             with ThreadPoolExecutor(self.options.threads) as pool:
-                draws.unfinished = sum(pool.map(work, busy))
+                unfinished = sum(pool.map(work, busy))
         else:
-            draws.unfinished = sum(map(work, busy))
-        return draws
-
-    def _draw(
-        self,
-        index: int,
-        stream: np.random.SeedSequence,
-        draws: _Draws,
-        low: int,
-        high: int,
-        probe_rate: float,
-    ) -> int:
-        piece = self.slices[index]
-        ring = piece.ring
-        chain = self.profile.chain
-        return int(
-            draw_pairs(
-                np.random.default_rng(stream),
-                high - low,
-                self.stiffness,
-                chain.ground,
-                chain.form_code,
-                ring.angles,
-                ring.direction,
-                ring.energy,
-                ring.extent,
-                piece.link,
-                self.covered,
-                piece.rivals,
-                ring.rows,
-                ring.right,
-                ring.z,
-                ring.root,
-                ring.projector,
-                ring.schur,
-                ring.fibre,
-                probe_rate,
-                self.probe_mean,
-                self.probe_root,
-                draws.log_weights[low:high],
-                draws.codes[low:high],
-                draws.links[low:high],
-                draws.others[low:high],
-                draws.corrections[low:high],
-            )
-        )
+            unfinished = sum(map(work, busy))
+        return Draws(record, batch[order], unfinished)
 
     def sample(self, progress: Callable[[int], None] | None = None) -> JFactor:
         """Sample until the tolerance, the time or the number of draws is reached.
@@ -254,16 +215,39 @@ class ClosureSampler:
         SolveError
             No draw could be closed.
         """
+        began = time.perf_counter()
+        return self.result(self.draw(progress), began)
+
+    def draw(
+        self,
+        progress: Callable[[int], None] | None = None,
+        watch: Callable[[Draws], None] | None = None,
+    ) -> Draws:
+        """Draw until the tolerance, the time or the number of draws is reached.
+
+        Parameters
+        ----------
+        watch : callable, optional
+            Called with every round of draws and their strains, which are not kept.
+        """
         options = self.options
         began = time.perf_counter()
-        draws = self._round(options.first_batches, options.pairs_per_batch, options.probe_rate)
+
+        def round_of(batches: int) -> Draws:
+            new = self._round(batches, options.pairs_per_batch, watch is not None)
+            if watch is not None:
+                watch(new)
+                new.record = new.record._replace(strains=new.record.strains[:0])
+            return new
+
+        draws = round_of(options.first_batches)
         while True:
             if progress is not None:
-                progress(draws.log_weights.size)
+                progress(draws.record.log_weights.size)
             summary = _batch_summary(draws)
             error = summary[1]
             elapsed = time.perf_counter() - began
-            done = draws.log_weights.size
+            done = draws.record.log_weights.size
             if error <= options.tolerance or done >= options.most_draws:
                 break
             if elapsed >= options.max_seconds:
@@ -275,30 +259,38 @@ class ClosureSampler:
                 wanted = min(wanted, batches * (options.max_seconds - elapsed) / elapsed)
             # No more than fivefold at a time: the error that sets the number is itself uncertain.
             count = max(2, math.ceil(min(wanted, 4.0 * batches)))
-            draws = draws.joined(self._round(count, options.pairs_per_batch, options.probe_rate))
-        return self._result(draws, began)
+            draws = draws.joined(round_of(count))
+        return draws
 
-    def _result(self, draws: _Draws, began: float) -> JFactor:
+    def result(self, draws: Draws, began: float) -> JFactor:
+        """J from draws; ``began`` is when the clock started.
+
+        Raises
+        ------
+        SolveError
+            No draw could be closed.
+        """
         profile, options, chain = self.profile, self.options, self.profile.chain
+        record = draws.record
         mean, error = _batch_summary(draws)
         if not mean > 0.0:
             raise SolveError(
-                f"J factor of {chain.name}: none of {draws.codes.size} draws could be closed; "
+                f"J factor of {chain.name}: none of {record.codes.size} draws could be closed; "
                 "use half-chain sampling",
             )
-        weights = np.exp(draws.log_weights)
+        weights = draws.weights
         pair = 0.5 * weights.sum(axis=1)
         with np.errstate(divide="ignore"):
             tails = summarise_weights(np.log(pair))
-        folded = float(np.mean(draws.codes == NO_CROSSING))
-        others = draws.others.mean() / mean
-        others_error = draws.others.std() / math.sqrt(draws.others.size) / mean
+        folded = float(np.mean(record.codes == NO_CROSSING))
+        others = record.others.mean() / mean
+        others_error = record.others.std() / math.sqrt(record.others.size) / mean
         bias = profile.bias_bound + others + 2.0 * others_error
         log_parts: dict[int, float] = {}
         errors: dict[int, float] = {}
-        counted = draws.codes == COUNTED
-        for link in np.unique(draws.links[counted]):
-            part = np.where(counted & (draws.links == link), weights, 0.0).mean(axis=1)
+        counted = record.codes == COUNTED
+        for link in np.unique(record.links[counted]):
+            part = np.where(counted & (record.links == link), weights, 0.0).mean(axis=1)
             values = _batch_means(part, draws.batch)
             if not values.mean() > 0.0:  # so far out that its weight underflows
                 continue
@@ -348,9 +340,9 @@ def _batch_means(pair_values: Array, batch: NDArray[np.int64]) -> Array:
     return means
 
 
-def _batch_summary(draws: _Draws) -> tuple[float, float]:
+def _batch_summary(draws: Draws) -> tuple[float, float]:
     """Mean weight and its relative standard error from batches; the error is inf for no weight."""
-    values = _batch_means(np.exp(draws.log_weights).mean(axis=1), draws.batch)
+    values = _batch_means(draws.weights.mean(axis=1), draws.batch)
     mean = float(values.mean())
     if not mean > 0.0:
         return 0.0, math.inf
@@ -367,7 +359,7 @@ def sample_closure(
     Raises
     ------
     SolveError
-        No closed ring could be held, or no draw could be closed.
+        No register-constrained minimum, or no draw could be closed.
     """
     profile = target if isinstance(target, RegisterProfile) else register_profile(target)
     return ClosureSampler(profile, options or ClosureOptions(), seed).sample()

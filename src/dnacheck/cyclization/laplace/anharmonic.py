@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dnacheck.cyclization.laplace.constrained_minimum import HeldRing
+from dnacheck.cyclization.laplace.constrained_minimum import steps_in_RT
 from dnacheck.cyclization.laplace.kernels.anharmonic import scaled_log_weights
 from dnacheck.cyclization.laplace.register import RegisterProfile, register_profile
 from dnacheck.cyclization.result import JFactor, JStatus, link_shares
@@ -86,38 +86,27 @@ class AnharmonicTerm:
 
 
 class _Drawer:
-    """Draws pairs about the held rings in proportion to their Laplace weights."""
+    """Draws pairs about the register-constrained minima in proportion to their Laplace weights."""
 
     def __init__(self, profile: RegisterProfile, seed: Randomness) -> None:
-        chain = profile.chain
-        self.chain = chain
-        self.stiffness = np.ascontiguousarray(chain.energy_scale_RT * chain.stiffness)
-        self.rings: list[HeldRing] = [ring for chart in profile.charts for ring in chart.rings]
-        masses = np.array(
-            [
-                ring.log_density + math.log(chart.spacing)
-                for chart in profile.charts
-                for ring in chart.rings
-            ]
-        )
+        self.steps = steps_in_RT(profile.chain)
+        self.slices = profile.slices()
+        masses = np.array([piece.log_mass for piece in self.slices])
         weights = np.exp(masses - masses.max())
         self.shares = weights / weights.sum()
         self.sequence = seed_sequence(seed)
 
     def draw(self, pairs: int) -> Array:
         """Log-weights (pairs, scales, 2)."""
-        first, *streams = self.sequence.spawn(1 + len(self.rings))
+        first, *streams = self.sequence.spawn(1 + len(self.slices))
         counts = np.random.default_rng(first).multinomial(pairs, self.shares)
         out = np.empty((pairs, len(_SCALES), 2))
         done = 0
-        for ring, stream, count in zip(self.rings, streams, counts, strict=True):
+        for piece, stream, count in zip(self.slices, streams, counts, strict=True):
             if count:
-                scaled_log_weights(
-                    np.random.default_rng(stream), _SCALES, self.stiffness, self.chain.ground,
-                    self.chain.form_code, ring.angles, ring.direction, ring.extent, ring.rows,
-                    ring.right, ring.z, ring.root, ring.projector, ring.schur, ring.fibre,
-                    out[done : done + count],
-                )  # fmt: skip
+                rng, part = np.random.default_rng(stream), out[done : done + count]
+                factors = piece.minimum.factors
+                scaled_log_weights(rng, _SCALES, self.steps, piece.centre, factors, part)
                 done += count
         return out
 
@@ -152,7 +141,7 @@ def anharmonic_term(
     options: AnharmonicOptions | None = None,
     seed: Randomness = 0,
 ) -> AnharmonicTerm:
-    """First anharmonic term of ln J, from Gaussian draws about the held rings.
+    """First anharmonic term of ln J, from Gaussian draws about the register-constrained minima.
 
     Raises
     ------
@@ -193,7 +182,7 @@ def corrected_laplace(
     Raises
     ------
     SolveError
-        No closed ring could be held, or too few draws reach a closed shape.
+        No register-constrained minimum, or too few draws reach a closed shape.
     """
     began = time.perf_counter()
     options = options or AnharmonicOptions()

@@ -1,4 +1,4 @@
-"""One closed ring held at one register, and the Gaussian of the shapes about it."""
+"""The lowest closed shape of one register, and the Gaussian of the shapes about it."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from dnacheck.cyclization.laplace.isolated import log_prefactor
 from dnacheck.cyclization.laplace.kernels import register as rk
-from dnacheck.cyclization.laplace.kernels.gaussian import ROWS
+from dnacheck.cyclization.laplace.kernels.gaussian import ROWS, SliceFactors
 from dnacheck.model.chain import Chain
+from dnacheck.model.chain_kernels import HingeSteps
 from dnacheck.numerics.outcome import InputError
 
 Array = NDArray[np.float64]
@@ -35,9 +36,9 @@ class RegisterOptions:
     depth : float
         Registers and links whose density lies below the largest by exp(-depth) are left out.
     tolerance : float
-        Largest entry of the gradient of a held ring's Lagrangian, RT per radian.
+        Largest entry of the gradient of a register-constrained minimum's Lagrangian, RT per radian.
     max_iterations : int
-        Of Newton's method for one held ring.
+        Of Newton's method for one register-constrained minimum.
     rule_error : float
         Relative error of the trapezoid rule above which the number of registers is doubled.
     """
@@ -62,12 +63,10 @@ class RegisterOptions:
 
 
 @dataclass(frozen=True)
-class HeldRing:
+class ConstrainedMinimum:
     """The lowest closed shape of one register and the Gaussian of its neighbours.
 
-    Energies in RT, lengths in steps. ``rows``, ``projector`` and ``fibre`` are flat, (7, 3N),
-    (7, 3N) and (6, 3N); ``right``, ``z`` and ``root`` are the factors of
-    :func:`dnacheck.cyclization.laplace.kernels.gaussian.factorise_slice`.
+    Energies in RT, lengths in steps.
 
     Attributes
     ----------
@@ -87,6 +86,8 @@ class HeldRing:
         ln of J(psi), mol/L per radian, by Laplace's approximation.
     direction : ndarray, shape (N, 3)
         Row whose product with the angles is |S| on this slice.
+    factors : SliceFactors
+        The Gaussian of its neighbours.
     """
 
     position: int
@@ -98,22 +99,22 @@ class HeldRing:
     extent: float
     log_density: float
     direction: Array
-    rows: Array
-    right: Array
-    z: Array
-    root: Array
-    projector: Array
-    schur: Array
-    fibre: Array
+    factors: SliceFactors
 
 
-class Holder:
-    """Holds rings of one molecule and link; keeps what every call needs."""
+def steps_in_RT(chain: Chain) -> HingeSteps:
+    """The chain's steps as compiled kernels read them, their stiffness in RT."""
+    stiffness = np.ascontiguousarray(chain.energy_scale_RT * chain.stiffness)
+    return HingeSteps(chain.arrays.ground, stiffness, chain.form_code)
+
+
+class Constrainer:
+    """Register-constrained minima of one molecule and link; keeps what every call needs."""
 
     def __init__(self, chain: Chain, link: int, options: RegisterOptions) -> None:
         self.chain, self.link, self.options = chain, link, options
-        self.stiffness = np.ascontiguousarray(chain.energy_scale_RT * chain.stiffness)
-        self.flexibility = np.ascontiguousarray(np.linalg.inv(self.stiffness))
+        self.steps = steps_in_RT(chain)
+        self.flexibility = np.ascontiguousarray(np.linalg.inv(self.steps.stiffness))
         n = chain.n_steps
         self.along, self.across = np.empty((n, 3)), np.empty((n, 3))
         rk.register_functionals(chain.ground, chain.form_code, link, self.along, self.across)
@@ -125,42 +126,36 @@ class Holder:
             - 3.5 * math.log(2.0 * math.pi)
         )
 
-    def hold(
+    def minimum(
         self, position: float, registers: int, angles: Array, multipliers: Array
-    ) -> HeldRing | None:
+    ) -> ConstrainedMinimum | None:
         """Ring at ``position`` on a circle of so many registers, from a start close by."""
         n = self.chain.n_steps
         register = 2.0 * math.pi * position / registers
         angles, multipliers = angles.copy(), multipliers.copy()
-        rows, projector = np.empty((ROWS, 3 * n)), np.empty((ROWS, 3 * n))
-        right, z, root = np.empty((n, 3, ROWS)), np.empty((n, 3, ROWS)), np.empty((n, 6))
-        schur, fibre = np.empty((ROWS, ROWS)), np.empty((6, 3 * n))
-        figures = np.zeros(rk.N_FIGURES)
-        code = rk.hold(
-            angles,
-            multipliers,
-            self.stiffness,
+        factors = SliceFactors(
+            rows=np.empty((ROWS, 3 * n)),
+            right=np.empty((n, 3, ROWS)),
+            z=np.empty((n, 3, ROWS)),
+            root=np.empty((n, 6)),
+            projector=np.empty((ROWS, 3 * n)),
+            schur=np.empty((ROWS, ROWS)),
+            directions=np.empty((6, 3 * n)),
+        )
+        problem = rk.RegisterProblem(
             self.flexibility,
-            self.chain.ground,
-            self.chain.form_code,
             self.along,
             self.across,
             register,
             self.options.tolerance,
             self.options.max_iterations,
-            rows,
-            right,
-            z,
-            root,
-            projector,
-            schur,
-            fibre,
-            figures,
         )
+        figures = np.zeros(rk.N_FIGURES)
+        code = rk.constrained_minimum(self.steps, problem, angles, multipliers, factors, figures)
         extent = float(figures[rk.EXTENT])
-        if code != rk.HELD or not extent > 0.0:
+        if code != rk.FOUND or not extent > 0.0:
             return None
-        return HeldRing(
+        return ConstrainedMinimum(
             position=int(round(position)) % registers,
             register=register,
             angles=angles,
@@ -173,18 +168,12 @@ class Holder:
             - 0.5 * float(figures[rk.LOG_DET_KKT])
             + math.log(extent),
             direction=math.cos(register) * self.along + math.sin(register) * self.across,
-            rows=rows,
-            right=right,
-            z=z,
-            root=root,
-            projector=projector,
-            schur=schur,
-            fibre=fibre,
+            factors=factors,
         )
 
     def advance(
-        self, ring: HeldRing, before: HeldRing | None, step: int, registers: int
-    ) -> HeldRing | None:
+        self, ring: ConstrainedMinimum, before: ConstrainedMinimum | None, step: int, registers: int
+    ) -> ConstrainedMinimum | None:
         """The next ring of a branch, extrapolated from the last two and by ever smaller steps."""
         here, last = ring, before
         reached, gap, pieces = 0.0, 1.0, 1
@@ -195,7 +184,7 @@ class Holder:
                 ahead = (target - reached) / gap
                 angles = angles + ahead * (here.angles - last.angles)
                 multipliers = multipliers + ahead * (here.multipliers - last.multipliers)
-            found = self.hold(ring.position + step * target, registers, angles, multipliers)
+            found = self.minimum(ring.position + step * target, registers, angles, multipliers)
             if found is None or np.abs(found.angles - here.angles).max() > _JUMP:
                 pieces *= 2
                 if pieces > 2**_SUBDIVISIONS:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dnacheck.cyclization.method import Method, Run, held_rings_of, rings_of
+from dnacheck.cyclization.method import Method, Run, register_profile_of, rings_of
 from dnacheck.numerics.outcome import InputError
 
 if TYPE_CHECKING:
@@ -66,11 +66,11 @@ class Laplace(Method):
             from dnacheck.cyclization.laplace.isolated import laplace
 
             return laplace(rings_of(target))
-        held = held_rings_of(target)
+        profile = register_profile_of(target)
         if not self.order:
             from dnacheck.cyclization.laplace.register import register_laplace
 
-            return register_laplace(held)
+            return register_laplace(profile)
         from dnacheck.cyclization.laplace.anharmonic import corrected_laplace
 
-        return corrected_laplace(held, self.options(run), run.rng)
+        return corrected_laplace(profile, self.options(run), run.rng)

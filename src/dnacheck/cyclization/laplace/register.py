@@ -1,8 +1,8 @@
-"""Closed rings held at every register, and the Laplace J factor integrated over the register.
+"""Register-constrained minima of closed chains, and Laplace's J integrated over the register.
 
 The register, how the molecule is rolled about its own axis, is the softest mode of a ring and free
-in a straight molecule, where Laplace's approximation fails. Holding it leaves stiff modes: with S
-the linear function of :mod:`dnacheck.cyclization.laplace.kernels.register`, v the row of its
+in a straight molecule, where Laplace's approximation fails. Constraining it leaves stiff modes:
+with S the linear function of :mod:`dnacheck.cyclization.laplace.kernels.register`, v the row of its
 phase's constraint and seven constraint rows G, the density of closed shapes per radian of register
 is
 
@@ -22,7 +22,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from dnacheck.cyclization.laplace.constrained_minimum import HeldRing, Holder, RegisterOptions
+from dnacheck.cyclization.closure.kernels.draws import SliceCentre
+from dnacheck.cyclization.laplace.constrained_minimum import (
+    ConstrainedMinimum,
+    Constrainer,
+    RegisterOptions,
+)
 from dnacheck.cyclization.laplace.isolated import register_spread
 from dnacheck.cyclization.laplace.kernels import register as rk
 from dnacheck.cyclization.laplace.kernels.gaussian import ROWS
@@ -36,21 +41,21 @@ from dnacheck.numerics.outcome import SolveError
 Array = NDArray[np.float64]
 
 _SAME_SHAPE = 1e-4
-"""Two held rings are one when no angle differs by more, in radians."""
+"""Two register-constrained minima are one when no angle differs by more, in radians."""
 _ZERO_MODE_SPREAD = 4.0
 """Register spread in radians above which it is called free; the circle ends at pi."""
 
 
 @dataclass(frozen=True)
 class Chart:
-    """Held rings of one link over the register circle.
+    """Register-constrained minima of one link over the register circle.
 
     Attributes
     ----------
     link : int
     registers : int
         Number of grid points on the whole circle; only those that matter have rings.
-    rings : tuple of HeldRing
+    rings : tuple of ConstrainedMinimum
         By position; two rings at one position are different minima (branches) there.
     rule_error : float
         Estimated relative error of the trapezoid rule, see :func:`_trapezoid_error`.
@@ -60,7 +65,7 @@ class Chart:
 
     link: int
     registers: int
-    rings: tuple[HeldRing, ...]
+    rings: tuple[ConstrainedMinimum, ...]
     rule_error: float
     lost: float
 
@@ -74,10 +79,27 @@ class Chart:
         """ln of this link's J (mol/L) by Laplace's approximation on every slice."""
         return math.log(self.spacing) + _log_sum([ring.log_density for ring in self.rings])
 
-    def rivals(self, ring: HeldRing) -> Array:
+    def rivals(self, ring: ConstrainedMinimum) -> Array:
         """Angles (R, N, 3) of the other rings at the same register."""
         others = [r.angles for r in self.rings if r.position == ring.position and r is not ring]
         return np.array(others) if others else np.empty((0, *ring.angles.shape))
+
+
+@dataclass(frozen=True)
+class Slice:
+    """One register-constrained minimum with all that drawing about it needs.
+
+    Attributes
+    ----------
+    minimum : ConstrainedMinimum
+    centre : SliceCentre
+    log_mass : float
+        ln of its Laplace value times the spacing of registers, mol/L.
+    """
+
+    minimum: ConstrainedMinimum
+    centre: SliceCentre
+    log_mass: float
 
 
 @dataclass(frozen=True)
@@ -98,6 +120,27 @@ class RegisterProfile:
     def log_j(self) -> float:
         """ln of J (mol/L) by register-integrated Laplace."""
         return _log_sum([chart.log_j for chart in self.charts])
+
+    def slices(self) -> list[Slice]:
+        """Every minimum of every chart."""
+        covered = np.array([chart.link for chart in self.charts], dtype=np.int64)
+        return [
+            Slice(
+                ring,
+                SliceCentre(
+                    ring.angles,
+                    ring.direction,
+                    ring.energy,
+                    ring.extent,
+                    chart.link,
+                    covered,
+                    chart.rivals(ring),
+                ),
+                ring.log_density + math.log(chart.spacing),
+            )
+            for chart in self.charts
+            for ring in chart.rings
+        ]
 
     @property
     def bias_bound(self) -> float:
@@ -136,25 +179,29 @@ def _seeds(search: RingSearch) -> dict[int, list[tuple[Array, Array]]]:
     return seeds
 
 
-def _height(holder: Holder, seeds: list[tuple[Array, Array]]) -> float:
+def _height(constrainer: Constrainer, seeds: list[tuple[Array, Array]]) -> float:
     """ln J of a link, had all registers the density of the seeds' own: an upper estimate."""
     best = -math.inf
     for angles, multipliers in seeds:
-        register, _ = rk.register_of(angles, holder.along, holder.across)
-        ring = holder.hold(register / (2.0 * math.pi), 1, angles, multipliers)
+        register, _ = rk.register_of(angles, constrainer.along, constrainer.across)
+        ring = constrainer.minimum(register / (2.0 * math.pi), 1, angles, multipliers)
         if ring is not None:
             best = max(best, ring.log_density)
     return best + math.log(2.0 * math.pi)
 
 
 def _walk(
-    holder: Holder, first: HeldRing, registers: int, placed: dict[int, list[HeldRing]], top: float
+    constrainer: Constrainer,
+    first: ConstrainedMinimum,
+    registers: int,
+    placed: dict[int, list[ConstrainedMinimum]],
+    top: float,
 ) -> tuple[float, float]:
     """Follow a branch both ways from ``first``; returns the new top and what was lost.
 
     ``placed`` collects rings by position; ``top`` is the largest log-density so far.
     """
-    depth = holder.options.depth
+    depth = constrainer.options.depth
     lost = 0.0
     placed.setdefault(first.position, []).append(first)
     top = max(top, first.log_density)
@@ -163,7 +210,7 @@ def _walk(
         for _ in range(registers):
             if here.log_density < top - depth:
                 break
-            after = holder.advance(here, before, step, registers)
+            after = constrainer.advance(here, before, step, registers)
             if after is None:
                 lost += math.exp(here.log_density - top)
                 break
@@ -176,7 +223,7 @@ def _walk(
     return top, lost
 
 
-def _trapezoid_error(rings: list[HeldRing], registers: int) -> float:
+def _trapezoid_error(rings: list[ConstrainedMinimum], registers: int) -> float:
     """Estimated relative error of the trapezoid rule of so many registers.
 
     The rule errs by twice the Fourier coefficient of order ``registers`` of the density, over its
@@ -192,25 +239,27 @@ def _trapezoid_error(rings: list[HeldRing], registers: int) -> float:
     return 2.0 * math.pow(fraction, registers / order)
 
 
-def _chart(holder: Holder, seeds: list[tuple[Array, Array]], spreads: list[float]) -> Chart | None:
+def _chart(
+    constrainer: Constrainer, seeds: list[tuple[Array, Array]], spreads: list[float]
+) -> Chart | None:
     """Chart of one link from its minima."""
-    options = holder.options
+    options = constrainer.options
     spread = min(min(spreads), _ZERO_MODE_SPREAD)
     registers = 2 * math.ceil(math.pi / (options.spacing * spread))
     registers = int(np.clip(registers, options.fewest, options.most))
     while True:
-        placed: dict[int, list[HeldRing]] = {}
+        placed: dict[int, list[ConstrainedMinimum]] = {}
         top, lost = -math.inf, 0.0
         for angles, multipliers in seeds:
-            register, _ = rk.register_of(angles, holder.along, holder.across)
+            register, _ = rk.register_of(angles, constrainer.along, constrainer.across)
             position = round(register * registers / (2.0 * math.pi))
-            first = holder.hold(position, registers, angles, multipliers)
+            first = constrainer.minimum(position, registers, angles, multipliers)
             if first is None:
                 continue
             known = placed.get(first.position, [])
             if any(np.abs(first.angles - r.angles).max() < _SAME_SHAPE for r in known):
                 continue
-            top, more = _walk(holder, first, registers, placed, top)
+            top, more = _walk(constrainer, first, registers, placed, top)
             lost += more
         rings = [ring for position in sorted(placed) for ring in placed[position]]
         rings = [ring for ring in rings if ring.log_density > top - options.depth]
@@ -221,7 +270,7 @@ def _chart(holder: Holder, seeds: list[tuple[Array, Array]], spreads: list[float
             break
         registers *= 2
     total = sum(math.exp(ring.log_density - top) for ring in rings)
-    return Chart(holder.link, registers, tuple(rings), error, lost / total)
+    return Chart(constrainer.link, registers, tuple(rings), error, lost / total)
 
 
 def register_profile(
@@ -229,7 +278,7 @@ def register_profile(
     options: RegisterOptions | None = None,
     search_options: SearchOptions | None = None,
 ) -> RegisterProfile:
-    """Held rings over registers and links.
+    """Register-constrained minima over registers and links.
 
     Parameters
     ----------
@@ -239,33 +288,33 @@ def register_profile(
     Raises
     ------
     SolveError
-        No closed ring could be held at any link searched.
+        No register-constrained minimum was found at any link searched.
     """
     began = time.perf_counter()
     options = options or RegisterOptions()
     search = find_rings(target, search_options) if isinstance(target, Chain) else target
     chain = search.chain
     seeds = _seeds(search)
-    holders = {link: Holder(chain, link, options) for link in seeds}
-    heights = {link: _height(holders[link], seeds[link]) for link in seeds}
+    constrainers = {link: Constrainer(chain, link, options) for link in seeds}
+    heights = {link: _height(constrainers[link], seeds[link]) for link in seeds}
     best = max(heights.values(), default=-math.inf)
     charts: list[Chart] = []
     warnings: list[str] = []
     omitted = 0.0
     for link in sorted(seeds, key=lambda k: -heights[k]):
         if heights[link] == -math.inf:
-            warnings.append(f"link {link}: no ring could be held at any register")
+            warnings.append(f"link {link}: no ring was found at any register")
             continue
         if heights[link] < best - options.depth:
             omitted += math.exp(heights[link] - best)
             continue
-        holder = holders[link]
+        constrainer = constrainers[link]
         spreads = [
             register_spread(chain, link, q, m[:6] / chain.energy_scale_RT) for q, m in seeds[link]
         ]
-        chart = _chart(holder, seeds[link], spreads)
+        chart = _chart(constrainer, seeds[link], spreads)
         if chart is None:
-            warnings.append(f"link {link}: no ring could be held at the grid's registers")
+            warnings.append(f"link {link}: no ring was found at the grid's registers")
             continue
         if chart.lost > 1e-3:
             warnings.append(
@@ -293,7 +342,7 @@ def register_profile(
 def register_laplace(
     target: Chain | RingSearch | RegisterProfile, options: RegisterOptions | None = None
 ) -> JFactor:
-    """J factor by Laplace's approximation at held registers, integrated over them.
+    """J factor by Laplace's approximation at constrained registers, integrated over them.
 
     Right to Laplace's order for soft and zero registers alike. As for
     :func:`dnacheck.cyclization.laplace.isolated.laplace` the error of the approximation itself, 0.2
@@ -302,7 +351,7 @@ def register_laplace(
     Raises
     ------
     SolveError
-        No closed ring could be held at any link searched.
+        No register-constrained minimum was found at any link searched.
     """
     began = time.perf_counter()
     profile = target if isinstance(target, RegisterProfile) else register_profile(target, options)

@@ -1,7 +1,7 @@
-"""Compiled draws of exactly closed shapes about one held ring, with their importance weights.
+"""Compiled draws of exactly closed shapes about a register-constrained minimum, and their weights.
 
 Every closed shape on the slice is q* + x + Y y for exactly one x with G x = 0, so integrating over
-the slice is integrating over x and summing over the crossings y of its fibre. Each draw counts one
+the slice is integrating over x and summing over the crossings y above it. Each draw counts one
 crossing, that of :func:`dnacheck.cyclization.closure.kernels.projection.follow`, with the weight
 
     exp(-(E(q) - E*) + x^T H x / 2) / |det G(q) Y| * |S(q)| / |S*|
@@ -14,14 +14,18 @@ number of further starts until it is found again has the mean 1 / p_j.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
-from dnacheck.cyclization.closure.kernels.projection import follow, newton_fibre, same_solution
+from dnacheck.cyclization.closure.kernels.projection import (
+    empty_shape,
+    follow,
+    newton_projection,
+    same_solution,
+)
 from dnacheck.cyclization.laplace.kernels.gaussian import dot, draw_closed
-from dnacheck.model.chain_kernels import WEDGE
 from dnacheck.numerics.curve_topology import link_of_ring
 
 COUNTED = 0
@@ -35,6 +39,72 @@ _MOST_TRIALS = 1000
 _SMALL_WEIGHT = 0.1
 """Crossings lighter than this fraction of the Laplace value survive only with probability
 weight / fraction and count that much more, which keeps probes of negligible ones short."""
+
+
+class SliceCentre(NamedTuple):
+    """A register-constrained minimum, and which shapes near it are its own to count.
+
+    Attributes
+    ----------
+    angles, direction : ndarray, shape (N, 3)
+        The minimum, and the row of |S| at its register.
+    energy, extent : float
+        In RT, and |S|.
+    link : int
+    covered : ndarray, shape (C,)
+        Links that have charts of their own.
+    rivals : ndarray, shape (R, N, 3)
+        Other minima of the same link and register; a shape nearer to one of them is theirs.
+    """
+
+    angles: Any
+    direction: Any
+    energy: float
+    extent: float
+    link: int
+    covered: Any
+    rivals: Any
+
+
+class Probes(NamedTuple):
+    """Search for crossings that a draw does not count.
+
+    Attributes
+    ----------
+    rate : float
+        Fraction of draws that are probed; draws whose branch folds always are.
+    mean, root : ndarray, shapes (6,), (6, 6)
+        Gaussian of the random starts: its mean and lower Cholesky factor.
+    """
+
+    rate: float
+    mean: Any
+    root: Any
+
+
+class DrawRecord(NamedTuple):
+    """What is kept of pairs of draws, filled by :func:`draw_pairs`.
+
+    Attributes
+    ----------
+    log_weights : ndarray, shape (pairs, 2)
+    codes : ndarray, shape (pairs, 2)
+        COUNTED or the reason of a zero weight.
+    links : ndarray, shape (pairs, 2)
+    others : ndarray, shape (pairs, 2)
+        Weight of the other crossings, 0 where not probed.
+    corrections : ndarray, shape (pairs, 2, 6)
+        y.
+    strains : ndarray, shape (pairs, 2, N, 3) or (0, 2, N, 3)
+        q - q^ of counted draws, 0 for the others; no pairs, where they are not wanted.
+    """
+
+    log_weights: Any
+    codes: Any
+    links: Any
+    others: Any
+    corrections: Any
+    strains: Any
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
@@ -71,35 +141,23 @@ def chart_of_link(link: int, covered: Any) -> int:
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
 def _log_weight(
-    angles: Any,
-    centres: Any,
-    frames: Any,
-    det: float,
-    quadratic: float,
-    stiffness: Any,
-    ground: Any,
-    direction: Any,
-    energy: float,
-    extent: float,
-    link: int,
-    covered: Any,
-    centre: Any,
-    rivals: Any,
+    shape: Any, det: float, quadratic: float, steps: Any, centre: Any
 ) -> tuple[float, int, int]:
     """Log-weight of a shape, what became of it, and its link."""
-    found = dot(direction.reshape(angles.size), angles.reshape(angles.size))
+    angles = shape.angles
+    found = dot(centre.direction.reshape(angles.size), angles.reshape(angles.size))
     if not found > 0.0:
         return -math.inf, OTHER_SIDE, NO_LINK
-    shape_link = link_of_ring(centres, frames)[0]
-    if chart_of_link(shape_link, covered) != link:
+    shape_link = link_of_ring(shape.centres, shape.frames)[0]
+    if chart_of_link(shape_link, centre.covered) != centre.link:
         return -math.inf, OTHER_CHART, shape_link
-    if rivals.shape[0] > 0:
-        own = _distance(angles, centre, stiffness)
-        for r in range(rivals.shape[0]):
-            if _distance(angles, rivals[r], stiffness) < own:
+    if centre.rivals.shape[0] > 0:
+        own = _distance(angles, centre.angles, steps.stiffness)
+        for r in range(centre.rivals.shape[0]):
+            if _distance(angles, centre.rivals[r], steps.stiffness) < own:
                 return -math.inf, OTHER_CHART, shape_link
-    value = energy - _energy(angles, ground, stiffness) + 0.5 * quadratic
-    return value - math.log(abs(det)) + math.log(found / extent), COUNTED, shape_link
+    value = centre.energy - _energy(angles, steps.ground, steps.stiffness) + 0.5 * quadratic
+    return value - math.log(abs(det)) + math.log(found / centre.extent), COUNTED, shape_link
 
 
 @njit(cache=True, nogil=True)
@@ -109,144 +167,64 @@ def _distance(angles: Any, centre: Any, stiffness: Any) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def draw_pairs(
-    rng: Any,
-    pairs: int,
-    stiffness: Any,
-    ground: Any,
-    form: int,
-    centre: Any,
-    direction: Any,
-    energy: float,
-    extent: float,
-    link: int,
-    covered: Any,
-    rivals: Any,
-    rows: Any,
-    right: Any,
-    z: Any,
-    root: Any,
-    projector: Any,
-    schur: Any,
-    fibre: Any,
-    probe_rate: float,
-    probe_mean: Any,
-    probe_root: Any,
-    log_weights: Any,
-    codes: Any,
-    links: Any,
-    others: Any,
-    corrections: Any,
-) -> int:
-    """Draw antithetic pairs +x, -x about one held ring and weigh them.
+def draw_pairs(rng: Any, steps: Any, centre: Any, factors: Any, probes: Any, record: Any) -> int:
+    """Draw antithetic pairs +x, -x about one register-constrained minimum and weigh them.
 
     Parameters
     ----------
-    stiffness, ground, centre, direction : (N, 3, 3) in RT, (N, 3), (N, 3), (N, 3); the last is
-        the row of |S| at the slice's register, ``extent`` its value at the centre.
-    covered : (C,), links that have charts of their own. rivals : (R, N, 3), other held rings of
-        the same link and register; a shape nearer to one of them is theirs to count.
-    rows, right, z, root, projector, schur, fibre : as filled by
-        :func:`dnacheck.cyclization.laplace.kernels.register.hold`.
-    probe_rate : fraction of draws that are probed for other crossings; draws whose branch folds
-        always are. probe_mean, probe_root : (6,), (6, 6), Gaussian of the random starts.
-    log_weights, codes, links, others, corrections : (pairs, 2) and, the last, (pairs, 2, 6),
-        filled: log-weight, COUNTED or the reason of a zero weight, link, weight of the other
-        crossings (0 where not probed), and y.
+    steps : HingeSteps, stiffness in RT. centre : SliceCentre.
+    factors : SliceFactors, as filled by
+        :func:`dnacheck.cyclization.laplace.kernels.register.constrained_minimum`.
+    probes : Probes. record : DrawRecord, filled.
 
     Returns
     -------
     unfinished : probes that reached the bound on trials.
     """
-    n = centre.shape[0]
+    n = centre.angles.shape[0]
     m = 3 * n
-    centres = np.empty((n + 1, 3))
-    frames = np.empty((n + 1, 3, 3))
-    axes = np.empty((n, 3, 3))
-    halves = np.empty((n if form != WEDGE else 0, 5, 3))
-    jacobian = np.empty((6, m))
-    angles = np.empty((n, 3))
+    form = steps.form
+    shape = empty_shape(n, form)
     normals = np.empty((n, 3))
     x = np.empty((n, 3))
     draw = x.reshape(m)
-    flat_centre = centre.reshape(m)
+    flat_centre = centre.angles.reshape(m)
+    directions = factors.directions
     y = np.empty(6)
     trial = np.empty(6)
     unfinished = 0
-    for pair in range(pairs):
-        quadratic = draw_closed(rng, rows, right, z, root, projector, schur, normals, x)
+    for pair in range(record.log_weights.shape[0]):
+        quadratic = draw_closed(rng, factors, normals, x)
         for side in range(2):
             if side == 1:
                 for k in range(m):
                     draw[k] = -draw[k]
-            met, det = follow(
-                flat_centre, draw, fibre, form, y, angles, centres, frames, axes, halves, jacobian
-            )
-            log_weights[pair, side] = -math.inf
-            codes[pair, side] = NO_CROSSING
-            links[pair, side] = NO_LINK
-            others[pair, side] = 0.0
+            met, det = follow(flat_centre, draw, directions, form, y, shape)
+            weight, code, shape_link = -math.inf, NO_CROSSING, NO_LINK
             if met:
-                weight, code, shape_link = _log_weight(
-                    angles,
-                    centres,
-                    frames,
-                    det,
-                    quadratic,
-                    stiffness,
-                    ground,
-                    direction,
-                    energy,
-                    extent,
-                    link,
-                    covered,
-                    centre,
-                    rivals,
-                )
-                log_weights[pair, side] = weight
-                codes[pair, side] = code
-                links[pair, side] = shape_link
+                weight, code, shape_link = _log_weight(shape, det, quadratic, steps, centre)
+            record.log_weights[pair, side] = weight
+            record.codes[pair, side] = code
+            record.links[pair, side] = shape_link
+            record.others[pair, side] = 0.0
             for i in range(6):
-                corrections[pair, side, i] = y[i] if met else math.nan
-            chance = probe_rate if met else min(1.0, 8.0 * probe_rate)
+                record.corrections[pair, side, i] = y[i] if met else math.nan
+            if record.strains.shape[0] > 0:
+                for s in range(n):
+                    for k in range(3):
+                        strain = shape.angles[s, k] - steps.ground[s, k]
+                        record.strains[pair, side, s, k] = strain if code == COUNTED else 0.0
+            chance = probes.rate if met else min(1.0, 8.0 * probes.rate)
             if not (chance > 0.0 and rng.random() < chance):
                 continue
             # Probe: any crossing but the one counted above.
-            _random_start(rng, probe_mean, probe_root, trial)
-            code, det = newton_fibre(
-                flat_centre,
-                draw,
-                1.0,
-                fibre,
-                form,
-                True,
-                _PROBE_ITERATIONS,
-                trial,
-                angles,
-                centres,
-                frames,
-                axes,
-                halves,
-                jacobian,
+            _random_start(rng, probes.mean, probes.root, trial)
+            code, det = newton_projection(
+                flat_centre, draw, 1.0, directions, form, True, _PROBE_ITERATIONS, trial, shape
             )
             if code < 0 or (met and same_solution(trial, y)):
                 continue
-            weight, code, shape_link = _log_weight(
-                angles,
-                centres,
-                frames,
-                det,
-                quadratic,
-                stiffness,
-                ground,
-                direction,
-                energy,
-                extent,
-                link,
-                covered,
-                centre,
-                rivals,
-            )
+            weight, code, shape_link = _log_weight(shape, det, quadratic, steps, centre)
             if weight == -math.inf:
                 continue
             survival = min(1.0, math.exp(min(weight, 0.0)) / _SMALL_WEIGHT)
@@ -258,27 +236,14 @@ def draw_pairs(
             again = False
             while not again and trials < _MOST_TRIALS:
                 trials += 1
-                _random_start(rng, probe_mean, probe_root, trial)
-                code, det = newton_fibre(
-                    flat_centre,
-                    draw,
-                    1.0,
-                    fibre,
-                    form,
-                    True,
-                    _PROBE_ITERATIONS,
-                    trial,
-                    angles,
-                    centres,
-                    frames,
-                    axes,
-                    halves,
-                    jacobian,
+                _random_start(rng, probes.mean, probes.root, trial)
+                code, det = newton_projection(
+                    flat_centre, draw, 1.0, directions, form, True, _PROBE_ITERATIONS, trial, shape
                 )
                 again = code >= 0 and same_solution(trial, y)
             if not again:
                 unfinished += 1
-            others[pair, side] = math.exp(weight) * trials / (chance * survival)
+            record.others[pair, side] = math.exp(weight) * trials / (chance * survival)
     return unfinished
 
 

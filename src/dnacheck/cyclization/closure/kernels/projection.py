@@ -1,15 +1,16 @@
-"""Compiled correction of a linearised draw onto exact closure, along a fixed six-dimensional fibre.
+"""Compiled closure projection of a linearised draw, along six fixed directions.
 
 A draw x on the null space of the slice's seven rows is moved to q* + x + Y y, where Y = K^-1 G^T
 (G K^-1 G^T)^-1 without its register column: Y keeps the register row and Newton's iteration in
-the six numbers y meets closure exactly. A fibre may cross the closed shapes several times;
-:func:`follow` keeps to the crossing that is reached from y = 0 along the ray t x, 0 <= t <= 1.
+the six numbers y meets closure exactly. The plane of those y may cross the closed shapes several
+times; :func:`follow` keeps to the crossing that is reached from y = 0 along the ray t x, 0 <= t <=
+1.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -19,6 +20,7 @@ from dnacheck.equilibria.discrete.kernels.closure import (
     closure_residual,
     linearise,
 )
+from dnacheck.model.chain_kernels import WEDGE
 
 CLOSED = 1e-9
 """Closure residual, displacement over contour length and radians, at which a shape is closed;
@@ -27,6 +29,39 @@ SAME_SOLUTION = 1e-5
 """Relative difference of y below which two solutions are one."""
 _RAY_STEPS = 60
 _SMALLEST_RAY_STEP = 1e-3
+
+
+class Shape(NamedTuple):
+    """A shape and what its closure is computed from; every projection overwrites it.
+
+    Attributes
+    ----------
+    angles : ndarray, shape (N, 3)
+    centres, frames : ndarray, shapes (N + 1, 3), (N + 1, 3, 3)
+    axes : ndarray, shape (N, 3, 3)
+    halves : ndarray, shape (N, 5, 3), or (0, 5, 3) for the wedge
+    jacobian : ndarray, shape (6, 3N)
+    """
+
+    angles: Any
+    centres: Any
+    frames: Any
+    axes: Any
+    halves: Any
+    jacobian: Any
+
+
+@njit(cache=True, nogil=True)
+def empty_shape(n: int, form: int) -> Shape:
+    """Room for a shape of ``n`` steps."""
+    return Shape(
+        np.empty((n, 3)),
+        np.empty((n + 1, 3)),
+        np.empty((n + 1, 3, 3)),
+        np.empty((n, 3, 3)),
+        np.empty((n if form != WEDGE else 0, 5, 3)),
+        np.empty((6, 3 * n)),
+    )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -62,13 +97,13 @@ def solve_six(matrix: Any, rhs: Any, out: Any) -> float:
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
-def _transverse(jacobian: Any, fibre: Any, out: Any) -> None:
+def _transverse(jacobian: Any, directions: Any, out: Any) -> None:
     """G Y (6, 6) from G (6, 3N) and Y stored as (6, 3N)."""
     n = jacobian.shape[1]
     for i in range(6):
         g = jacobian[i]
         for j in range(6):
-            y = fibre[j]
+            y = directions[j]
             total = 0.0
             for k in range(n):
                 total += g[k] * y[k]
@@ -76,30 +111,31 @@ def _transverse(jacobian: Any, fibre: Any, out: Any) -> None:
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
-def _shape(centre: Any, draw: Any, t: float, fibre: Any, y: Any, out: Any) -> None:
+def _displace(centre: Any, draw: Any, t: float, directions: Any, y: Any, out: Any) -> None:
     """out = centre + t draw + Y y, all flat (3N,)."""
     y0, y1, y2, y3, y4, y5 = y[0], y[1], y[2], y[3], y[4], y[5]
     for k in range(centre.shape[0]):
-        a = centre[k] + t * draw[k] + fibre[0, k] * y0 + fibre[1, k] * y1 + fibre[2, k] * y2
-        out[k] = a + fibre[3, k] * y3 + fibre[4, k] * y4 + fibre[5, k] * y5
+        a = (
+            centre[k]
+            + t * draw[k]
+            + directions[0, k] * y0
+            + directions[1, k] * y1
+            + directions[2, k] * y2
+        )
+        out[k] = a + directions[3, k] * y3 + directions[4, k] * y4 + directions[5, k] * y5
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def newton_fibre(
+def newton_projection(
     centre: Any,
     draw: Any,
     t: float,
-    fibre: Any,
+    directions: Any,
     form: int,
     damped: bool,
     most: int,
     y: Any,
-    angles: Any,
-    centres: Any,
-    frames: Any,
-    axes: Any,
-    halves: Any,
-    jacobian: Any,
+    shape: Any,
 ) -> tuple[int, float]:
     """Newton's iteration in y (6,), in place, from its given value.
 
@@ -111,18 +147,19 @@ def newton_fibre(
     code : iterations used, -1 if it did not converge.
     det : det G Y at the shape found, relative to its value 1 at the centre.
     """
-    n = angles.shape[0]
+    n = shape.angles.shape[0]
+    centres, frames, axes = shape.centres, shape.frames, shape.axes
     closure = np.empty(6)
     matrix = np.empty((6, 6))
     step = np.empty(6)
     last = np.empty(6)
-    flat = angles.reshape(3 * n)
+    flat = shape.angles.reshape(3 * n)
     size_before = math.inf
     fraction = 1.0
     det = 0.0
     for iteration in range(most):
-        _shape(centre, draw, t, fibre, y, flat)
-        linearise(angles, form, centres, frames, axes, halves)
+        _displace(centre, draw, t, directions, y, flat)
+        linearise(shape.angles, form, centres, frames, axes, shape.halves)
         closure_residual(centres, frames, closure)
         size = 0.0
         for i in range(6):
@@ -138,8 +175,8 @@ def newton_fibre(
             continue
         if not damped and not size < 4.0 * size_before:
             return -1, 0.0
-        closure_jacobian(centres, axes, jacobian)
-        _transverse(jacobian, fibre, matrix)
+        closure_jacobian(centres, axes, shape.jacobian)
+        _transverse(shape.jacobian, directions, matrix)
         det = solve_six(matrix, closure, step)
         if not damped and not det > 0.0:
             return -1, 0.0
@@ -155,22 +192,12 @@ def newton_fibre(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def follow(
-    centre: Any,
-    draw: Any,
-    fibre: Any,
-    form: int,
-    y: Any,
-    angles: Any,
-    centres: Any,
-    frames: Any,
-    axes: Any,
-    halves: Any,
-    jacobian: Any,
+    centre: Any, draw: Any, directions: Any, form: int, y: Any, shape: Any
 ) -> tuple[bool, float]:
     """The crossing on the branch through the centre, by Newton or, failing that, along the ray.
 
-    ``y`` (6,) and ``angles`` (N, 3) receive the shape. Returns whether it was reached and det G Y
-    there. Where the branch folds (det G Y = 0) before t = 1, the fibre has no crossing on it.
+    ``y`` (6,) and ``shape`` receive it. Returns whether it was reached and det G Y
+    there. Where the branch folds (det G Y = 0) before t = 1, there is no crossing on it.
     """
     reached = 0.0
     before = 0.0
@@ -183,22 +210,7 @@ def follow(
             y[i] = 0.0
             if reached > 0.0:
                 y[i] = here[i] + (here[i] - back[i]) * (t - reached) / (reached - before)
-        code, det = newton_fibre(
-            centre,
-            draw,
-            t,
-            fibre,
-            form,
-            False,
-            8,
-            y,
-            angles,
-            centres,
-            frames,
-            axes,
-            halves,
-            jacobian,
-        )
+        code, det = newton_projection(centre, draw, t, directions, form, False, 8, y, shape)
         if code >= 0:
             if t >= 1.0:
                 return True, det

@@ -1,4 +1,4 @@
-"""Compiled Gaussian of the shapes near a closed ring, held at a register, in linear time.
+"""Compiled Gaussian of the shapes near a closed ring of given register, in linear time.
 
 A slice holds seven linear functions of the angles at first order: the six of closure (rows b and a
 of :mod:`dnacheck.equilibria.discrete.kernels.closure`) and the register row v. Its rows are G (7,
@@ -18,7 +18,7 @@ the Gaussian of Laplace's approximation, whatever R. Energies are in RT, lengths
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -30,6 +30,35 @@ ROWS = 7
 """Constraint rows of a slice: displacement (3), rotation (3), register (1)."""
 WIDTH = 8
 """Columns handled together: the seven rows and one right-hand side."""
+
+
+class SliceFactors(NamedTuple):
+    """The Gaussian about one register-constrained minimum, as draws need it.
+
+    Attributes
+    ----------
+    rows : ndarray, shape (7, 3N)
+        G.
+    right, z : ndarray, shape (N, 3, 7)
+        Generators and D^-1 (g - right P), see :func:`factorise_slice`.
+    root : ndarray, shape (N, 6)
+        Inverse Cholesky factors of D, packed as (00, 10, 11, 20, 21, 22).
+    projector : ndarray, shape (7, 3N)
+        B = M^-1 G^T (G M^-1 G^T)^-1.
+    schur : ndarray, shape (7, 7)
+        (G M^-1 G^T)^-1.
+    directions : ndarray, shape (6, 3N)
+        Y of :mod:`dnacheck.cyclization.closure.kernels.projection`; G Y = 1 on the rows of closure
+        and 0 on that of the register.
+    """
+
+    rows: Any
+    right: Any
+    z: Any
+    root: Any
+    projector: Any
+    schur: Any
+    directions: Any
 
 
 @njit(cache=True, nogil=True)
@@ -314,21 +343,11 @@ def dot(a: Any, b: Any) -> float:
 
 
 @njit(cache=True, nogil=True)
-def draw_closed(
-    rng: Any,
-    rows: Any,
-    right: Any,
-    z: Any,
-    root: Any,
-    projector: Any,
-    schur: Any,
-    normals: Any,
-    out: Any,
-) -> float:
+def draw_closed(rng: Any, factors: Any, normals: Any, out: Any) -> float:
     """Draw x (N, 3) from the slice's Gaussian under closure to first order; x^T H x returns.
 
-    The arrays are as filled by :func:`dnacheck.cyclization.laplace.kernels.register.hold`;
-    ``normals`` (N, 3) is left with the standard normals that were drawn.
+    ``factors`` are :class:`SliceFactors`; ``normals`` (N, 3) is left with the standard normals
+    that were drawn.
     """
     quadratic = 0.0
     for s in range(normals.shape[0]):
@@ -336,17 +355,17 @@ def draw_closed(
             value = rng.standard_normal()
             normals[s, k] = value
             quadratic += value * value
-    draw_slice(right, z, root, normals, out)
+    draw_slice(factors.right, factors.z, factors.root, normals, out)
     flat = out.reshape(out.size)
     open_by = np.empty(ROWS)
     for i in range(ROWS):
-        open_by[i] = dot(rows[i], flat)
+        open_by[i] = dot(factors.rows[i], flat)
     for i in range(ROWS):
         for j in range(ROWS):
-            quadratic -= open_by[i] * schur[i, j] * open_by[j]
+            quadratic -= open_by[i] * factors.schur[i, j] * open_by[j]
     for i in range(ROWS):
         c = open_by[i]
-        b = projector[i]
+        b = factors.projector[i]
         for k in range(flat.shape[0]):
             flat[k] -= c * b[k]
     return quadratic

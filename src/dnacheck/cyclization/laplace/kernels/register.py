@@ -1,4 +1,4 @@
-"""Compiled equilibria of a ring held at a register.
+"""Compiled minima of a ring whose register is constrained.
 
 The register is the phase of S = sum_s exp(i alpha_s) (-theta_s + i phi_s), with alpha_s the twist
 that a uniformly overtwisted ring of the given link accumulates up to the bend of step s: the
@@ -10,7 +10,7 @@ circle: every shape has one register unless S = 0.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -33,18 +33,18 @@ from dnacheck.equilibria.discrete.kernels.closure import (
 )
 from dnacheck.model.chain_kernels import WEDGE
 
-HELD = 0
+FOUND = 0
 NOT_CONVERGED = 1
 NOT_FINITE = 2
 NOT_A_MINIMUM = 3
 
-# Positions of the figures of a held ring.
+# Positions of the figures of a register-constrained minimum.
 ENERGY, LOG_DET_KKT, EXTENT, SLOPE, ITERATIONS = range(5)
 N_FIGURES = 5
 
 CLOSED = 1e-7
-"""Closure residual (steps, radians) of a held ring. Newton's last step leaves far less; and what
-is left changes no sampled J, whose draws close by themselves."""
+"""Closure residual (steps, radians) of a register-constrained minimum. Newton's last step leaves
+far less; and what is left changes no sampled J, whose draws close by themselves."""
 _TURN_CAP = 0.1
 """Largest change of one angle in one iteration, in radians."""
 _FIRST_PENALTY = 4.0
@@ -81,27 +81,34 @@ def register_of(angles: Any, along: Any, across: Any) -> tuple[float, float]:
     return math.atan2(y, x), math.hypot(x, y)
 
 
+class RegisterProblem(NamedTuple):
+    """One register of one link, and how well its minimum is to be met.
+
+    Attributes
+    ----------
+    inverse_stiffness : ndarray, shape (N, 3, 3)
+        In 1/RT.
+    along, across : ndarray, shape (N, 3)
+        Rows of Re S and Im S, see :func:`register_functionals`.
+    register : float
+        In radians.
+    tolerance : float
+        Largest entry of the gradient of the Lagrangian, RT per radian.
+    most : int
+        Iterations.
+    """
+
+    inverse_stiffness: Any
+    along: Any
+    across: Any
+    register: float
+    tolerance: float
+    most: int
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
-def hold(
-    angles: Any,
-    multipliers: Any,
-    stiffness: Any,
-    inverse_stiffness: Any,
-    ground: Any,
-    form: int,
-    along: Any,
-    across: Any,
-    register: float,
-    tolerance: float,
-    most: int,
-    flat_rows: Any,
-    right: Any,
-    z: Any,
-    root: Any,
-    projector: Any,
-    schur: Any,
-    fibre: Any,
-    figures: Any,
+def constrained_minimum(
+    steps: Any, problem: Any, angles: Any, multipliers: Any, factors: Any, figures: Any
 ) -> int:
     """Minimum of the energy over closed shapes of one register, and the Gaussian about it.
 
@@ -110,20 +117,20 @@ def hold(
 
     Parameters
     ----------
+    steps : HingeSteps, stiffness in RT. problem : RegisterProblem.
     angles, multipliers : (N, 3), (7,); start and result. Energies in RT, lengths in steps.
-    stiffness, inverse_stiffness : (N, 3, 3), RT and its inverse. tolerance : largest entry of the
-    Lagrangian's gradient (RT per radian). flat_rows : (7, 3N), filled with the rows of G. right, z,
-    root : see :func:`dnacheck.cyclization.laplace.kernels.gaussian.factorise_slice`. projector :
-    (7, 3N), filled with B = M^-1 G^T (G M^-1 G^T)^-1. schur : (7, 7), filled with (G M^-1 G^T)^-1.
-    fibre : (6, 3N), filled with Y of :mod:`dnacheck.cyclization.closure.kernels.projection`; G Y =
-    1. figures : (5,), filled with energy, ln det KKT (RT, steps), |S|, d energy / d register and
+    factors : :class:`dnacheck.cyclization.laplace.kernels.gaussian.SliceFactors`, filled.
+    figures : (5,), filled with energy, ln det KKT (RT, steps), |S|, d energy / d register and
         iterations.
 
     Returns
     -------
-    code : HELD, NOT_CONVERGED, NOT_FINITE or NOT_A_MINIMUM.
+    code : FOUND, NOT_CONVERGED, NOT_FINITE or NOT_A_MINIMUM.
     """
     n = angles.shape[0]
+    form = steps.form
+    along, across = problem.along, problem.across
+    right, z, root, schur = factors.right, factors.z, factors.root, factors.schur
     centres = np.empty((n + 1, 3))
     frames = np.empty((n + 1, 3, 3))
     axes = np.empty((n, 3, 3))
@@ -139,13 +146,13 @@ def hold(
     small = np.empty((ROWS, WIDTH))
     new = np.empty(ROWS)
     step = np.empty((n, 3))
-    c, sn = math.cos(register), math.sin(register)
+    c, sn = math.cos(problem.register), math.sin(problem.register)
     for s in range(n):
         for j in range(3):
             row[s, j] = c * across[s, j] - sn * along[s, j]
-    for iteration in range(most + 1):
+    for iteration in range(problem.most + 1):
         linearise(angles, form, centres, frames, axes, halves)
-        energy = energy_gradient(angles, ground, stiffness, gradient)
+        energy = energy_gradient(angles, steps.ground, steps.stiffness, gradient)
         closure_residual(centres, frames, closure)
         constraint_rows(centres, axes, row, rows)
         closure[6] = 0.0
@@ -170,10 +177,10 @@ def hold(
         figures[ITERATIONS] = iteration
         if not (math.isfinite(energy) and math.isfinite(worst) and math.isfinite(open_by)):
             return NOT_FINITE
-        done = worst <= tolerance and open_by <= CLOSED
-        if not done and iteration == most:
+        done = worst <= problem.tolerance and open_by <= CLOSED
+        if not done and iteration == problem.most:
             return NOT_CONVERGED
-        stiff_columns(rows, inverse_stiffness, columns)
+        stiff_columns(rows, problem.inverse_stiffness, columns)
         products(rows, columns, gram)
         if math.isnan(invert_small(gram[:, :ROWS], weight)):
             return NOT_FINITE
@@ -181,7 +188,7 @@ def hold(
         log_det = math.nan
         for _ in range(_PENALTY_RISES):
             log_det = factorise_slice(
-                stiffness,
+                steps.stiffness,
                 form,
                 centres,
                 axes,
@@ -210,13 +217,13 @@ def hold(
             return NOT_FINITE
         if done:
             figures[LOG_DET_KKT] = log_det + log_small
-            combine(solved, schur, ROWS, projector)
-            combine(columns, weight, 6, fibre)
+            combine(solved, schur, ROWS, factors.projector)
+            combine(columns, weight, 6, factors.directions)
             for s in range(n):
                 for j in range(3):
                     for i in range(ROWS):
-                        flat_rows[i, 3 * s + j] = rows[s, j, i]
-            return HELD
+                        factors.rows[i, 3 * s + j] = rows[s, j, i]
+            return FOUND
         for i in range(ROWS):
             new[i] = 0.0
             for j in range(ROWS):

@@ -8,7 +8,7 @@ import pytest
 from dense_closure import block_diagonal, closure_hessian, end_pose, jacobian, null_space
 from short_chains import closed_ground_chain, soft_chain
 
-from dnacheck.cyclization.laplace.constrained_minimum import Holder, RegisterOptions
+from dnacheck.cyclization.laplace.constrained_minimum import Constrainer, RegisterOptions
 from dnacheck.cyclization.laplace.isolated import laplace, register_spread
 from dnacheck.cyclization.laplace.kernels import register as rk
 from dnacheck.cyclization.laplace.kernels.gaussian import ROWS, draw_slice, invert_small
@@ -41,7 +41,7 @@ def dense_parts(chain, ring):
     c, s = math.cos(ring.register), math.sin(ring.register)
     along, across = np.empty_like(ring.angles), np.empty_like(ring.angles)
     rk.register_functionals(chain.ground, chain.form_code, 1, along, across)
-    g = np.vstack([jacobian(ring.angles, form), ring.rows[6]])
+    g = np.vstack([jacobian(ring.angles, form), ring.factors.rows[6]])
     hessian = chain.energy_scale_RT * block_diagonal(chain.stiffness)
     hessian = hessian + closure_hessian(ring.angles, ring.multipliers[:6], form)
     assert math.hypot(c, s) == pytest.approx(1.0)
@@ -58,17 +58,18 @@ def test_it_is_closed_stationary_and_at_its_register(held):
     assert np.abs(end_pose(ring.angles, chain.step_form)).max() < 1e-6
     strain = ring.angles - chain.ground
     gradient = chain.energy_scale_RT * np.einsum("sij,sj->si", chain.stiffness, strain).ravel()
-    rows = np.vstack([jacobian(ring.angles, chain.step_form), ring.rows[6]])
+    rows = np.vstack([jacobian(ring.angles, chain.step_form), ring.factors.rows[6]])
     assert np.abs(gradient + ring.multipliers @ rows).max() < 1e-3
     assert abs(ring.multipliers[6]) > 0.1
 
 
 def test_slope_is_the_derivative_of_the_energy(held):
     chain, link, ring = held
-    holder = Holder(chain, link, RegisterOptions())
+    constrainer = Constrainer(chain, link, RegisterOptions())
     turns = ring.register / (2 * math.pi)
     low, high = (
-        holder.hold(turns + step, 1, ring.angles, ring.multipliers) for step in (-1e-4, 1e-4)
+        constrainer.minimum(turns + step, 1, ring.angles, ring.multipliers)
+        for step in (-1e-4, 1e-4)
     )
     slope = (high.energy - low.energy) / (4e-4 * math.pi)
     assert ring.slope == pytest.approx(slope, rel=1e-4)
@@ -101,10 +102,10 @@ def test_draws_have_the_covariance_of_the_projected_hessian(held):
     for i in range(n):
         normals, x = np.zeros((n // 3, 3)), np.empty((n // 3, 3))
         normals.ravel()[i] = 1.0
-        draw_slice(ring.right, ring.z, ring.root, normals, x)
-        open_by = ring.rows @ x.ravel()
-        columns.append(x.ravel() - open_by @ ring.projector)
-        quadratic = 1.0 - open_by @ ring.schur @ open_by
+        draw_slice(ring.factors.right, ring.factors.z, ring.factors.root, normals, x)
+        open_by = ring.factors.rows @ x.ravel()
+        columns.append(x.ravel() - open_by @ ring.factors.projector)
+        quadratic = 1.0 - open_by @ ring.factors.schur @ open_by
         assert columns[-1] @ hessian @ columns[-1] == pytest.approx(quadratic, abs=1e-5)
     t = np.array(columns).T
     expected = z @ np.linalg.inv(z.T @ hessian @ z) @ z.T
@@ -112,11 +113,15 @@ def test_draws_have_the_covariance_of_the_projected_hessian(held):
     np.testing.assert_allclose(g @ t, 0.0, atol=1e-5)
 
 
-def test_fibre_moves_closure_and_keeps_the_register(held):
+def test_directions_move_closure_and_keep_the_register(held):
     chain, _, ring = held
-    np.testing.assert_allclose(ring.rows[:6] @ ring.fibre.T, np.eye(6), atol=1e-8)
-    np.testing.assert_allclose(ring.rows[6] @ ring.fibre.T, 0.0, atol=1e-8)
-    np.testing.assert_allclose(ring.rows[:6], jacobian(ring.angles, chain.step_form), atol=1e-6)
+    np.testing.assert_allclose(
+        ring.factors.rows[:6] @ ring.factors.directions.T, np.eye(6), atol=1e-8
+    )
+    np.testing.assert_allclose(ring.factors.rows[6] @ ring.factors.directions.T, 0.0, atol=1e-8)
+    np.testing.assert_allclose(
+        ring.factors.rows[:6], jacobian(ring.angles, chain.step_form), atol=1e-6
+    )
 
 
 def test_register_integral_meets_laplace_where_the_ring_is_stiff():
