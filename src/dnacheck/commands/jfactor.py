@@ -90,6 +90,9 @@ def command(
         chain = build_chain(molecule, **model.chain_arguments())
         try:
             search = find_rings(chain, SearchOptions(links=link))
+            if isinstance(link, int):
+                # Raises where the link has no ring: no other's J may stand for it.
+                _ = search.lowest
             with progress(f"{chain.name}: draws", None, run.quiet or run.json) as advance:
                 result = way.compute(
                     search,

@@ -88,7 +88,8 @@ def command(
             if not run.json:
                 _print(record)
             for warning in record["warnings"]:
-                note(f"{record['target']}: {warning}", run.quiet)
+                # Why there is no ring is the answer, not a remark.
+                note(f"{record['target']}: {warning}", run.quiet and converged)
     if run.json:
         print_json(records[0] if len(molecules) == 1 else {"target": target, "molecules": records})
     if structure is not None:
@@ -162,8 +163,10 @@ def _discrete(
             f"discrete: {found.failed_starts} of {found.starts} starts did not converge; "
             "minima may be missing"
         )
+    warnings += [f"discrete: {text}" for text in found.notes]
     if not found.equilibria:
-        warnings.append(f"discrete: {found.status.value}")
+        if not found.notes:
+            warnings.append(f"discrete: {found.reason}")
         return None, []
     entries: list[dict[str, Any]] = [
         {
@@ -234,11 +237,10 @@ def _continuum(
         }
         for item in found.equilibria
     ]
-    minima = [item for item in found.equilibria if item.stable is not False]
-    if not minima:
-        warnings.append(f"continuum: {found.status.value}")
+    if not found.minima:
+        warnings.append(f"continuum: {found.reason}")
         return None, entries
-    return minima[0], entries
+    return found.lowest, entries
 
 
 def _write(

@@ -6,6 +6,7 @@ six parameters of a rigid base-pair step.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
@@ -159,11 +160,12 @@ class Chain:
         """Turns of the unstressed chain, the reference for choosing links.
 
         The sum of the ground twists; for rigid steps with what the mean bend of all steps, which
-        makes the chain a helix about an axis of its own, adds to it.
+        makes the chain a helix about an axis of its own, adds to it. The sum of twists is rounded
+        once, so it is the same for every cut of a ring.
         """
         if self.rigid:
             return float(relaxed_helix_turns(self.arrays.ground))
-        return float(self.ground[:, 0].sum() / (2.0 * np.pi))
+        return math.fsum(self.ground[:, 0].tolist()) / (2.0 * math.pi)
 
     def with_twist_ratio(self, twist_ratio: float) -> Chain:
         """The same chain with another uniform diagonal stiffness.

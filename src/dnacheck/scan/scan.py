@@ -28,7 +28,8 @@ import numpy as np
 
 from dnacheck import __version__
 from dnacheck.cyclization.laplace.isolated import log_prefactor
-from dnacheck.equilibria.discrete.search import candidate_links
+from dnacheck.equilibria.discrete.search import room, search_plan
+from dnacheck.equilibria.discrete.solve import NewtonOptions
 from dnacheck.io.files import atomic_write
 from dnacheck.io.sequences import Record, SequenceSource
 from dnacheck.model.chain import build_chain
@@ -115,11 +116,12 @@ def scan_row(name: str, letters: str, arguments: Mapping[str, Any]) -> list[str]
         return [*cells, " ".join(str(error).split())]
     figures = np.empty(sk.N_SCAN_FIGURES)
     scale = chain.energy_scale_RT
+    plan = search_plan(chain)
     found = sk.scan_molecule(
-        chain.ground,
-        chain.stiffness,
-        chain.form_code,
-        np.array(candidate_links(chain), dtype=np.int64),
+        chain.arrays,
+        plan,
+        NewtonOptions().limits,
+        room(plan),
         scale,
         log_prefactor(chain),
         figures,

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dnacheck.cyclization.result import JStatus
 from dnacheck.equilibria.discrete.kernels.closure import (
     closure_jacobian,
     closure_residual,
@@ -233,11 +232,7 @@ def centre_shapes(search: RingSearch) -> list[tuple[Array, Array, int]]:
     chain = search.chain
     shapes = [(r.angles, r.multipliers, r.link) for r in search.equilibria if r.stable is not False]
     if not shapes:
-        raise SolveError(
-            f"J factor of {chain.name}: no stable ring at links "
-            f"{', '.join(map(str, search.links_searched))}; {JStatus.NOT_FOUND.value}",
-            search,
-        )
+        raise SolveError(f"J factor of {chain.name}: {search.reason}", search)
     lowest = min(_energy_RT(chain, shape[0])[0] for shape in shapes)
     return [shape for shape in shapes if _energy_RT(chain, shape[0])[0] < lowest + _WINDOW_RT]
 

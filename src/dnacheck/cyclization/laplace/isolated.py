@@ -81,8 +81,7 @@ def require_rings(search: RingSearch) -> RingSearch:
     """
     if all(ring.stable is False for ring in search.equilibria):
         raise SolveError(
-            f"J factor of {search.chain.name}: no stable ring at links "
-            f"{', '.join(map(str, search.links_searched))}; {JStatus.NOT_FOUND.value}",
+            f"J factor of {search.chain.name}: {search.reason}",
             search,
         )
     return search

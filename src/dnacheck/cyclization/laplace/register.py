@@ -172,8 +172,7 @@ def _seeds(search: RingSearch) -> dict[int, list[tuple[Array, Array]]]:
     for link in search.links_searched:
         if link not in seeds:
             circle = np.empty((chain.n_steps, 3))
-            scratch = np.empty((chain.n_steps, 3))
-            register = best_register(chain.arrays, link, scratch)
+            register = best_register(chain.arrays, link)
             fill_circle(chain.ground, chain.form_code, link, register, circle)
             seeds[link] = [(circle, np.zeros(ROWS))]
     return seeds
@@ -323,11 +322,7 @@ def register_profile(
             )
         charts.append(chart)
     if not charts:
-        links = ", ".join(map(str, search.links_searched))
-        raise SolveError(
-            f"J factor of {chain.name}: no stable ring at links {links}; {JStatus.NOT_FOUND.value}",
-            search,
-        )
+        raise SolveError(f"J factor of {chain.name}: {search.reason}", search)
     charts.sort(key=lambda chart: -chart.log_j)
     return RegisterProfile(
         chain=chain,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -33,31 +34,60 @@ class ContinuumSearch:
     Attributes
     ----------
     equilibria : tuple of ContinuumRing
-        Every distinct equilibrium, lowest energy first.
+        Every distinct equilibrium, saddles included, lowest energy first. Where one link was asked
+        for, of that link only.
     failures : tuple of ContinuumRing
         Starts that did not converge, with status and residual.
     links : tuple of int
         Links that were tried.
     status : Status
+        NOT_FOUND also where every equilibrium is a saddle.
+    elsewhere : tuple of ContinuumRing
+        Equilibria of other links that starts of the one link asked for led to.
     """
 
     equilibria: tuple[ContinuumRing, ...]
     failures: tuple[ContinuumRing, ...]
     links: tuple[int, ...]
     status: Status
+    elsewhere: tuple[ContinuumRing, ...] = ()
+
+    @property
+    def minima(self) -> tuple[ContinuumRing, ...]:
+        """The equilibria that are not unstable, lowest first."""
+        return tuple(ring for ring in self.equilibria if ring.stable is not False)
 
     @property
     def lowest(self) -> ContinuumRing:
-        """The equilibrium of least energy.
+        """The minimum of least energy.
 
         Raises
         ------
         SolveError
-            When nothing converged; ``partial`` is this search.
+            When no minimum was found; ``partial`` is this search.
         """
-        if not self.equilibria:
-            raise SolveError(f"continuum ring: {self.status.value}", self)
-        return self.equilibria[0]
+        if not self.minima:
+            raise SolveError(f"continuum ring: {self.reason}", self)
+        return self.minima[0]
+
+    @property
+    def reason(self) -> str:
+        """Why there is no minimum, in one line."""
+        links = f"link{'s' if len(self.links) > 1 else ''} {', '.join(map(str, self.links))}"
+        ends: Counter[str] = Counter()
+        for ring in self.equilibria:
+            ends[f"saddle of link {ring.link} ({ring.energy_RT:.4f} RT)"] += 1
+        for ring in self.elsewhere:
+            kind = "saddle" if ring.stable is False else "ring"
+            ends[f"{kind} of link {ring.link} ({ring.energy_RT:.4f} RT)"] += 1
+        if self.failures:
+            nearest = min(ring.residual for ring in self.failures)
+            text = f"start{'s' if len(self.failures) > 1 else ''} without convergence"
+            ends[f"{text} (residual {nearest:.0e} at best)"] += len(self.failures)
+        reached = ", ".join(f"{count} {what}" for what, count in ends.items())
+        if self.equilibria:
+            return f"only saddles were found at {links}: {reached}"
+        return f"no equilibrium was found at {links}, but {reached}; search links auto or all"
 
 
 def candidate_links(rod: Rod) -> tuple[int, ...]:
@@ -87,7 +117,8 @@ def lowest_continuum_ring(
     where Newton's method finds no minimum from there the paths of ``homotopy`` are tried, and
     where they find none either, the other registers get the same treatment. Links whose minimum
     lies within 8 RT of the lowest also start from the other registers, by Newton's method alone:
-    that finds second minima and the saddle between registers.
+    that finds second minima and the saddle between registers. Where one link is asked for, only
+    rings whose link it is are returned.
 
     Parameters
     ----------
@@ -128,8 +159,12 @@ def lowest_continuum_ring(
         for turn in pending[link]:
             _collect(attempts(rod, link, turn, options, detour=False), found, failures)
     found.sort(key=lambda ring: ring.energy)
-    status = Status.CONVERGED if found else Status.NOT_FOUND
-    return ContinuumSearch(tuple(found), tuple(failures), tuple(wanted), status)
+    one = wanted[0] if isinstance(links, (int, np.integer)) else None
+    kept = tuple(ring for ring in found if one is None or ring.link == one)
+    minima = any(ring.stable is not False for ring in kept)
+    status = Status.CONVERGED if minima else Status.NOT_FOUND
+    elsewhere = tuple(ring for ring in found if one is not None and ring.link != one)
+    return ContinuumSearch(kept, tuple(failures), tuple(wanted), status, elsewhere)
 
 
 def _wanted_links(rod: Rod, links: str | int | Iterable[int]) -> list[int]:

@@ -1,18 +1,30 @@
-"""The lowest ring of a molecule, found over links and registers."""
+"""The minima of a molecule's ring, found over links and registers.
+
+No result depends on which base pair is called the first: the compiled search works on a canonical
+cut of the ring and rolls back what it finds (``kernels.cut``).
+"""
 
 from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dnacheck.equilibria.discrete.kernels import newton as nk
-from dnacheck.equilibria.discrete.kernels.search import search
-from dnacheck.equilibria.discrete.solve import DiscreteRing, NewtonOptions, make_ring
+from dnacheck.equilibria.discrete.kernels.search import (
+    Minima,
+    SearchPlan,
+    best_register,
+    fill_start,
+    search,
+)
+from dnacheck.equilibria.discrete.solve import DiscreteRing, NewtonOptions, make_ring, solve_ring
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import InputError, SolveError, Status
 
@@ -21,11 +33,14 @@ LinkChoice = Literal["auto", "all"] | int
 _WINDOW_RT = 8.0
 """Minima this far above the lowest change J by less than a part in a thousand; links and
 registers beyond it are not searched by ``auto``."""
+_MOST_LINKS = 64
 _MOST_MINIMA = 64
 _ALL_LINKS_REACH = 2
 _ALL_REGISTERS = 8
-# Rings of rigid steps start from 0 and half a turn, and from these.
+# Rings of rigid steps start from the registers predicted and from these beyond the lowest.
 _RIGID_REGISTERS = np.array([0.5 * math.pi, 1.5 * math.pi])
+_EXCESS_STEPS = 16
+"""Steps by which a ring relaxed at a link is given the twist that it lacks or has too much."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +51,10 @@ class SearchOptions:
     ----------
     links : "auto", "all" or int
         ``auto``: the two links next to the ground twist and every other whose twisting energy
-        stays within 8 RT or half the bending energy of a circle, from the registers where the
-        planar ring is predicted to rest. ``all``: five links or more around the ground twist,
-        from eight more registers each. An integer: that link alone, eight more registers.
+        stays within 8 RT or half the bending energy of a circle, from the register where the
+        planar ring is predicted to rest and, where there is room for a second minimum, half a
+        turn from the first. ``all``: five links or more around the ground twist, from eight more
+        registers each. An integer: rings of that link alone, eight more registers.
     newton : NewtonOptions
     """
 
@@ -56,9 +72,22 @@ class SearchOptions:
 class RingSearch:
     """Every distinct minimum that a search found, lowest first.
 
-    ``links_searched`` are the links of the starting shapes; a start may relax to another link of
-    the same parity, because chains may pass through themselves. ``failed_starts`` counts starts
-    that did not converge.
+    Attributes
+    ----------
+    chain : Chain
+    equilibria : tuple of DiscreteRing
+        Where one link was asked for, minima of that link only.
+    links_searched : tuple of int
+        Links of the starting shapes. A start may relax to another link of the same parity,
+        because chains may pass through themselves.
+    starts, failed_starts : int
+        Starting shapes, and those of them that did not converge.
+    seconds : float
+    status : Status
+    ends : tuple of DiscreteRing
+        Where the starts came to an end, if one link was asked for and no ring of it was found.
+    notes : tuple of str
+        Bounds that the search met, and what became of a link that has no ring.
     """
 
     chain: Chain
@@ -68,6 +97,8 @@ class RingSearch:
     failed_starts: int
     seconds: float
     status: Status
+    ends: tuple[DiscreteRing, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def lowest(self) -> DiscreteRing:
@@ -79,27 +110,41 @@ class RingSearch:
             None was found.
         """
         if not self.equilibria:
-            raise SolveError(
-                f"discrete ring of {self.chain.name}: none of {self.starts} starts over links "
-                f"{self.links_searched} converged; {self.status.value}",
-                self,
-            )
+            raise SolveError(f"discrete ring of {self.chain.name}: {self.reason}", self)
         return self.equilibria[0]
+
+    @property
+    def reason(self) -> str:
+        """Why there is no ring, in one line."""
+        if self.notes:
+            return "; ".join(self.notes)
+        return (
+            f"no stable ring at links {', '.join(map(str, self.links_searched))}: "
+            f"{self.failed_starts} of {self.starts} starts did not converge to one; search links "
+            "all, or others"
+        )
 
 
 def candidate_links(chain: Chain) -> tuple[int, ...]:
-    """Links that ``auto`` searches, nearest to the ground twist first."""
-    turns = chain.relaxed_turns
+    """Links that ``auto`` searches, nearest to the ground twist first, 64 at most."""
+    return _links_in_reach(chain)[:_MOST_LINKS]
+
+
+def _links_in_reach(chain: Chain) -> tuple[int, ...]:
+    n, turns = chain.n_steps, chain.relaxed_turns
+    # Exact sums: the same for every cut of the ring.
     if chain.rigid:
         # What is left of a step's stiffness when the rest of it relaxes.
-        softness = np.linalg.inv(chain.stiffness).mean(axis=0)
-        twist = 1.0 / float(softness[0, 0])
-        bend = 2.0 / float(softness[1, 1] + softness[2, 2])
+        compliance = np.linalg.inv(chain.stiffness)
+        softness = math.fsum(compliance[:, 0, 0].tolist()) / n
+        bend = 2.0 * n / math.fsum((compliance[:, 1, 1] + compliance[:, 2, 2]).tolist())
     else:
-        twist = 1.0 / float(np.mean(1.0 / chain.stiffness[:, 0, 0]))
-        bend = 0.5 * float(np.mean(chain.stiffness[:, 1, 1] + chain.stiffness[:, 2, 2]))
-    allowed = max(_WINDOW_RT / chain.energy_scale_RT, math.pi**2 * bend / chain.n_steps)
-    reach = math.sqrt(2.0 * allowed * chain.n_steps / twist) / (2.0 * math.pi)
+        softness = math.fsum((1.0 / chain.stiffness[:, 0, 0]).tolist()) / n
+        bends = chain.stiffness[:, 1, 1] + chain.stiffness[:, 2, 2]
+        bend = math.fsum(bends.tolist()) / (2.0 * n)
+    allowed = max(_WINDOW_RT / chain.energy_scale_RT, math.pi**2 * bend / n)
+    reach = math.sqrt(2.0 * allowed * n * softness) / (2.0 * math.pi)
+    reach = min(reach, float(_MOST_LINKS))
     low, high = math.floor(turns - reach), math.ceil(turns + reach)
     chosen = [
         link
@@ -109,31 +154,42 @@ def candidate_links(chain: Chain) -> tuple[int, ...]:
     return tuple(sorted(chosen, key=lambda link: abs(link - turns)))
 
 
+def search_plan(chain: Chain, links: LinkChoice = "auto") -> SearchPlan:
+    """Links, registers and window of a search, for the compiled kernel."""
+    registers = np.arange(_ALL_REGISTERS) * (2.0 * np.pi / _ALL_REGISTERS)
+    if links == "auto":
+        near = np.array(candidate_links(chain), dtype=np.int64)
+        more = _RIGID_REGISTERS if chain.rigid else np.empty(0)
+        return SearchPlan(near, more, _WINDOW_RT / chain.energy_scale_RT)
+    if links == "all":
+        nearest = round(chain.relaxed_turns)
+        around = range(nearest - _ALL_LINKS_REACH, nearest + _ALL_LINKS_REACH + 1)
+        every = sorted({*around, *candidate_links(chain)})
+        return SearchPlan(np.array(every, dtype=np.int64), registers, math.inf)
+    return SearchPlan(np.array([links], dtype=np.int64), registers, math.inf)
+
+
+def room(plan: SearchPlan) -> int:
+    """Minima that are kept of a search."""
+    return min(_MOST_MINIMA, len(plan.links) * (3 + len(plan.registers)))
+
+
 def find_rings(chain: Chain, options: SearchOptions | None = None) -> RingSearch:
     """Minima of the closed chain over links and registers, lowest first.
 
-    Every start is a planar ring of a given link, rolled to the registers that second-order
-    perturbation in the ground bends selects (and to eight more with ``all`` or a given link); no
-    continuum solution is needed.
+    Every start is a planar ring of a given link, rolled to a register that second-order
+    perturbation in the ground bends selects, or half a turn away from a minimum (and to eight more
+    with ``all`` or a given link); no continuum solution is needed. Where one link is asked for
+    and no start rests at it, a ring that is relaxed there is given its twist step by step.
     """
     options = options or SearchOptions()
-    if options.links == "auto":
-        links: tuple[int, ...] = candidate_links(chain)
-        registers: NDArray[Any] = np.empty(0)
-        window = 0.0
-        if chain.rigid:
-            registers, window = _RIGID_REGISTERS, _WINDOW_RT / chain.energy_scale_RT
-    elif options.links == "all":
-        nearest = round(chain.relaxed_turns)
-        around = range(nearest - _ALL_LINKS_REACH, nearest + _ALL_LINKS_REACH + 1)
-        links = tuple(sorted({*around, *candidate_links(chain)}))
-        registers = np.arange(_ALL_REGISTERS) * (2.0 * np.pi / _ALL_REGISTERS)
-        window = math.inf
-    else:
-        links = (int(options.links),)
-        registers = np.arange(_ALL_REGISTERS) * (2.0 * np.pi / _ALL_REGISTERS)
-        window = math.inf
-    return search_minima(chain, links, registers, window, options.newton)
+    found = _searched(chain, search_plan(chain, options.links), options.newton)
+    if options.links == "auto" and len(_links_in_reach(chain)) > _MOST_LINKS:
+        text = f"only the {_MOST_LINKS} links nearest to the ground twist were searched"
+        return replace(found, notes=(*found.notes, text))
+    if isinstance(options.links, int):
+        return _of_one_link(found, int(options.links), options.newton)
+    return found
 
 
 def search_minima(
@@ -145,44 +201,134 @@ def search_minima(
 ) -> RingSearch:
     """Minima reached from planar rings of the given links and registers.
 
-    Each link starts from the registers where its planar ring is predicted to rest. Links whose
-    minimum lies within ``window`` (reduced energy) of the lowest start again from ``registers``,
-    in radians from the best of these.
+    Each link starts from the register where its planar ring is predicted to rest. Links whose
+    minimum lies within ``window`` (reduced energy) of the lowest start again: half a turn from
+    that minimum, and from ``registers``, in radians from the predicted one.
     """
-    most = min(_MOST_MINIMA, len(links) * (2 + len(registers)))
-    angles = np.empty((most, *chain.ground.shape))
-    multipliers = np.empty((most, 6))
-    figures = np.empty((most, nk.N_FIGURES))
+    plan = SearchPlan(
+        np.array(links, dtype=np.int64), np.asarray(registers, dtype=float), float(window)
+    )
+    return _searched(chain, plan, options)
+
+
+def _searched(chain: Chain, plan: SearchPlan, options: NewtonOptions) -> RingSearch:
+    most = room(plan)
+    minima = Minima(
+        np.empty((most, *chain.ground.shape)), np.empty((most, 6)), np.empty((most, nk.N_FIGURES))
+    )
     began = time.perf_counter()
     found, starts, failed = search(
-        chain.arrays,
-        np.array(links, dtype=np.int64),
-        registers,
-        window,
-        options.limits._replace(minima_only=True),
-        angles,
-        multipliers,
-        figures,
+        chain.arrays, plan, options.limits._replace(minima_only=True), minima
     )
     seconds = time.perf_counter() - began
-    order = np.argsort(figures[:found, nk.ENERGY], kind="stable")
+    order = np.argsort(minima.figures[:found, nk.ENERGY], kind="stable")
     rings = tuple(
         make_ring(
             chain,
-            angles[i].copy(),
-            multipliers[i].copy(),
-            figures[i],
+            minima.angles[i].copy(),
+            minima.multipliers[i].copy(),
+            minima.figures[i],
             nk.CONVERGED,
             seconds / max(found, 1),
         )
         for i in order
     )
+    notes = (f"only the first {most} minima found were kept",) if found == _MOST_MINIMA else ()
     return RingSearch(
         chain=chain,
         equilibria=rings,
-        links_searched=links,
+        links_searched=tuple(int(link) for link in plan.links),
         starts=starts,
         failed_starts=failed,
         seconds=seconds,
         status=Status.CONVERGED if rings else Status.NOT_FOUND,
+        notes=notes,
+    )
+
+
+def _of_one_link(found: RingSearch, link: int, options: NewtonOptions) -> RingSearch:
+    """The search with nothing but rings of the link asked for."""
+    here = tuple(ring for ring in found.equilibria if ring.link == link)
+    if here:
+        return replace(found, equilibria=here)
+    chain, began = found.chain, time.perf_counter()
+    ring, kept = _given_its_twist(chain, link, options)
+    if ring is not None:
+        seconds = found.seconds + time.perf_counter() - began
+        return replace(found, equilibria=(ring,), status=Status.CONVERGED, seconds=seconds)
+    ends = tuple(_ends(chain, link, options))
+    text = (
+        f"no stable ring of link {link} was found: of {len(ends)} starts at it {_summary(ends)}; "
+        f"a ring relaxed at link {link} keeps it up to {kept:.0%} of the excess of "
+        f"{link - chain.relaxed_turns:+.2f} turns; search links auto or all"
+    )
+    return replace(
+        found,
+        equilibria=(),
+        ends=ends,
+        notes=(text,),
+        status=Status.NOT_FOUND,
+        seconds=found.seconds + time.perf_counter() - began,
+    )
+
+
+def _given_its_twist(
+    chain: Chain, link: int, options: NewtonOptions
+) -> tuple[DiscreteRing | None, float]:
+    """A ring relaxed at a link, followed as its steps take the chain's own ground twist.
+
+    Returns
+    -------
+    ring : the lowest that still has the link at the end, or None.
+    kept : share of the excess twist up to which some ring kept the link.
+    """
+    excess = 2.0 * math.pi * (link - chain.relaxed_turns) / chain.n_steps
+    descend = replace(options, minima_only=True)
+
+    def at(share: float) -> Chain:
+        ground = chain.ground.copy()
+        ground[:, 0] += (1.0 - share) * excess
+        return replace(chain, ground=ground)
+
+    relaxed = _searched(at(0.0), search_plan(chain, link), options)
+    best: DiscreteRing | None = None
+    kept = 0.0
+    for start in relaxed.equilibria:
+        ring = start
+        for step in range(1, _EXCESS_STEPS + 1):
+            if not ring.status.ok or ring.stable is False or ring.link != link:
+                break
+            share = step / _EXCESS_STEPS
+            kept = max(kept, (step - 1) / _EXCESS_STEPS)
+            here = chain if step == _EXCESS_STEPS else at(share)
+            ring = solve_ring(here, ring.angles, descend, throw=False)
+        else:
+            good = ring.status.ok and ring.stable is not False and ring.link == link
+            if good and (best is None or ring.energy < best.energy):
+                best, kept = ring, 1.0
+    return best, kept
+
+
+def _ends(chain: Chain, link: int, options: NewtonOptions) -> Iterator[DiscreteRing]:
+    """Where planar rings of a link come to an end, from all registers."""
+    arrays = chain.arrays
+    first = best_register(arrays, link)
+    start = np.empty(chain.ground.shape)
+    for register in search_plan(chain, link).registers:
+        fill_start(arrays, link, first + register, start)
+        yield solve_ring(chain, start, replace(options, minima_only=True), throw=False)
+
+
+def _summary(ends: tuple[DiscreteRing, ...]) -> str:
+    """How many starts ended at which link, energy and residual."""
+    counts: Counter[str] = Counter()
+    worst: dict[str, float] = {}
+    for ring in ends:
+        where = f"ended at link {ring.link} ({ring.energy_RT:.4f} RT"
+        if not ring.status.ok:
+            where = f"stopped short of the tolerance ({ring.energy_RT:.1f} RT"
+        counts[where] += 1
+        worst[where] = max(worst.get(where, 0.0), ring.residual)
+    return ", ".join(
+        f"{count} {where}, residual {worst[where]:.0e})" for where, count in counts.most_common()
     )

@@ -1,10 +1,7 @@
 """Compiled minima of a ring whose register is constrained.
 
-The register is the phase of S = sum_s exp(i alpha_s) (-theta_s + i phi_s), with alpha_s the twist
-that a uniformly overtwisted ring of the given link accumulates up to the bend of step s: the
-direction of the mean bending axis in a frame that does not turn about the ring. S is linear in
-the angles, so the shapes of one register form a half hyperplane, and the register's range is a
-circle: every shape has one register unless S = 0.
+The register is that of :mod:`dnacheck.equilibria.discrete.kernels.registers`: the shapes of one
+register form a half hyperplane.
 """
 
 from __future__ import annotations
@@ -31,6 +28,10 @@ from dnacheck.equilibria.discrete.kernels.closure import (
     energy_gradient,
     linearise,
 )
+from dnacheck.equilibria.discrete.kernels.registers import (
+    register_functionals as register_functionals,
+)
+from dnacheck.equilibria.discrete.kernels.registers import register_of as register_of
 from dnacheck.model.chain_kernels import WEDGE
 
 FOUND = 0
@@ -49,36 +50,6 @@ _TURN_CAP = 0.1
 """Largest change of one angle in one iteration, in radians."""
 _FIRST_PENALTY = 4.0
 _PENALTY_RISES = 8
-
-
-@njit(cache=True, nogil=True)
-def register_functionals(ground: Any, form: int, link: int, along: Any, across: Any) -> None:
-    """Rows of Re S and Im S, each (N, 3), for a ring of ``link`` turns."""
-    n = ground.shape[0]
-    total = 0.0
-    for s in range(n):
-        total += ground[s, 0]
-    excess = (2.0 * math.pi * link - total) / n
-    phase = 0.0
-    for s in range(n):
-        twist = ground[s, 0] + excess
-        phase += twist if form == WEDGE else 0.5 * twist
-        c, sn = math.cos(phase), math.sin(phase)
-        along[s, 0] = across[s, 0] = 0.0
-        along[s, 1], along[s, 2] = -c, -sn
-        across[s, 1], across[s, 2] = -sn, c
-        if form != WEDGE:
-            phase += 0.5 * twist
-
-
-@njit(cache=True, nogil=True)
-def register_of(angles: Any, along: Any, across: Any) -> tuple[float, float]:
-    """Register in radians and |S| of a shape (N, 3)."""
-    x, y = 0.0, 0.0
-    for s in range(angles.shape[0]):
-        x += along[s, 1] * angles[s, 1] + along[s, 2] * angles[s, 2]
-        y += across[s, 1] * angles[s, 1] + across[s, 2] * angles[s, 2]
-    return math.atan2(y, x), math.hypot(x, y)
 
 
 class RegisterProblem(NamedTuple):

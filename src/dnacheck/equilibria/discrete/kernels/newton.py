@@ -17,6 +17,7 @@ from dnacheck.equilibria.discrete.kernels.kkt import (
     solve_kkt,
 )
 from dnacheck.equilibria.discrete.kernels.moves import line_search, move, residuals
+from dnacheck.equilibria.discrete.kernels.registers import KnownRegister, is_near
 from dnacheck.equilibria.discrete.kernels.states import (
     accumulated_turn,
     evaluate,
@@ -30,6 +31,7 @@ ITERATION_LIMIT = 1
 STEP_LIMIT = 2
 NOT_FINITE = 3
 SINGULAR = 4
+NEAR_KNOWN = 5
 
 
 class NewtonLimits(NamedTuple):
@@ -111,6 +113,22 @@ def newton(
     iterations, the weakest pivot and the number of eigenvalues that are zero to round-off. Every
     exit has a code; no loop is unbounded.
     """
+    nothing = np.empty((0, 3))
+    known = KnownRegister(nothing, nothing, 0.0, -1.0)
+    return newton_away(angles, multipliers, steps, boundary, limits, known, figures)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def newton_away(
+    angles: Any,
+    multipliers: Any,
+    steps: Any,
+    boundary: Boundary,
+    limits: NewtonLimits,
+    known: KnownRegister,
+    figures: Any,
+) -> int:
+    """:func:`newton`, given up with ``NEAR_KNOWN`` where it comes near a known ring's register."""
     stiffness = steps.stiffness
     tolerance, max_iterations = limits.tolerance, limits.max_iterations
     turn_cap, minima_only = limits.turn_cap, limits.minima_only
@@ -157,6 +175,9 @@ def newton(
         figures[ITERATIONS] = iteration
         if not (math.isfinite(energy) and math.isfinite(stationarity) and math.isfinite(worst)):
             code = NOT_FINITE
+            break
+        if is_near(state.angles, known):
+            code = NEAR_KNOWN
             break
         if figures[RESIDUAL] <= tolerance:
             unstable = _inspect(

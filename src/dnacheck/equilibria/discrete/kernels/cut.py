@@ -1,0 +1,128 @@
+"""Compiled canonical cut of a ring: which base pair is called the first does not matter to it.
+
+The canonical cut is the least rotation of the rows (ground angles, stiffness) of the steps in
+lexicographic order. Whatever works on it and rolls its results back gives every cut of one ring
+the same numbers, to the last bit.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from dnacheck.equilibria.boundary_kernels import ring_boundary
+from dnacheck.equilibria.discrete.kernels.moves import residuals
+from dnacheck.equilibria.discrete.kernels.states import by_kind, evaluate, new_state
+from dnacheck.model.chain_kernels import HingeSteps, fill_frames
+from dnacheck.model.rigid_kernels import RigidSteps, fill_rigid_frames
+
+
+@njit(cache=True, nogil=True)
+def _order(steps: Any, i: int, j: int) -> int:
+    """Sign of row i less row j of the steps, in lexicographic order."""
+    width = steps.ground.shape[1]
+    for a in range(width):
+        x, y = steps.ground[i, a], steps.ground[j, a]
+        if x != y:
+            return 1 if x > y else -1
+    for a in range(width):
+        for b in range(a, width):
+            x, y = steps.stiffness[i, a, b], steps.stiffness[j, a, b]
+            if x != y:
+                return 1 if x > y else -1
+    return 0
+
+
+@njit(cache=True, nogil=True)
+def least_rotation(steps: Any) -> int:
+    """First step of the least rotation, in linear time by two rivals and their common length."""
+    n = steps.ground.shape[0]
+    first, rival, length = 0, 1, 0
+    while first < n and rival < n and length < n:
+        order = _order(steps, (first + length) % n, (rival + length) % n)
+        if order == 0:
+            length += 1
+            continue
+        if order > 0:
+            first += length + 1
+        else:
+            rival += length + 1
+        if first == rival:
+            rival += 1
+        length = 0
+    return min(first, rival)
+
+
+@njit(cache=True, nogil=True)
+def rolled(rows: Any, cut: int) -> Any:
+    """Rows of an array, from row ``cut`` on."""
+    out = np.empty(rows.shape)
+    n = rows.shape[0]
+    for s in range(n):
+        out[s] = rows[(s + cut) % n]
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _rotated_hinges(steps: HingeSteps, cut: int) -> HingeSteps:
+    return HingeSteps(rolled(steps.ground, cut), rolled(steps.stiffness, cut), steps.form)
+
+
+@njit(cache=True, nogil=True)
+def _rotated_rigid(steps: RigidSteps, cut: int) -> RigidSteps:
+    return RigidSteps(rolled(steps.ground, cut), rolled(steps.stiffness, cut))
+
+
+rotated = by_kind(_rotated_hinges, _rotated_rigid)
+"""The ring's steps read from step ``cut`` on: (steps, cut)."""
+
+
+@njit(cache=True, nogil=True)
+def _hinge_shape(steps: HingeSteps, angles: Any, centres: Any, frames: Any) -> None:
+    fill_frames(angles, steps.form, centres, frames)
+
+
+@njit(cache=True, nogil=True)
+def _rigid_shape(steps: RigidSteps, angles: Any, centres: Any, frames: Any) -> None:
+    fill_rigid_frames(angles, centres, frames)
+
+
+fill_shape = by_kind(_hinge_shape, _rigid_shape)
+"""Centres (N+1, 3) and frames (N+1, 3, 3) of a chain: (steps, angles, centres, frames)."""
+
+
+@njit(cache=True, nogil=True)
+def roll_back(steps: Any, cut: int, angles: Any, multipliers: Any) -> tuple[float, float]:
+    """Turn a ring found for ``rotated(steps, cut)`` into one of ``steps``, in place.
+
+    The multipliers (force f, moment m) act at the first base pair and in its frame. Seen from
+    another pair at r with frame R they are R^T f and R^T (m - r x f).
+
+    Returns
+    -------
+    stationarity, closure : largest entries of the equations' residuals, as evaluated afterwards.
+    """
+    n = angles.shape[0]
+    if cut != 0:
+        centres = np.empty((n + 1, 3))
+        frames = np.empty((n + 1, 3, 3))
+        fill_shape(steps, angles, centres, frames)
+        pair = n - cut
+        old = angles.copy()
+        for s in range(n):
+            angles[s] = old[(s + pair) % n]
+        f, m, r = multipliers[:3].copy(), multipliers[3:].copy(), centres[pair]
+        m[0] -= r[1] * f[2] - r[2] * f[1]
+        m[1] -= r[2] * f[0] - r[0] * f[2]
+        m[2] -= r[0] * f[1] - r[1] * f[0]
+        for j in range(3):
+            multipliers[j], multipliers[3 + j] = 0.0, 0.0
+            for i in range(3):
+                multipliers[j] += frames[pair, i, j] * f[i]
+                multipliers[3 + j] += frames[pair, i, j] * m[i]
+    state = new_state(steps, ring_boundary())
+    state.angles[:] = angles
+    evaluate(state, steps)
+    return residuals(state, multipliers, np.empty(angles.shape))
