@@ -46,7 +46,7 @@ def test_defaults_are_those_of_the_paper():
     assert parse() == {
         "target": "11T15",
         "model": ModelSettings("trifonov2", None, None, None, "auto"),
-        "ring": RingSettings("both", "auto"),
+        "ring": RingSettings("both", "auto", "ring"),
         "continuum": ContinuumSettings(15, 20, 6),
         "run": RunSettings(False, 0, available_processors(), False, False),
     }
@@ -55,13 +55,13 @@ def test_defaults_are_those_of_the_paper():
 def test_every_option_arrives():
     settings = parse(
         *"--angles own.toml --twist-ratio 0.7 --persistence-length 500 --rise 3.3".split(),
-        *"--a-tracts 30..92 --model discrete --link -3 --filter-width 11 --intervals 30".split(),
-        *"--degree 5 --json --seed 7 --threads 3 --quiet --debug".split(),
+        *"--a-tracts 30..92 --model discrete --link -3 --ends nicked --filter-width 11".split(),
+        *"--intervals 30 --degree 5 --json --seed 7 --threads 3 --quiet --debug".split(),
     )
     assert settings == {
         "target": "11T15",
         "model": ModelSettings("own.toml", 0.7, 500.0, 3.3, (30, 92)),
-        "ring": RingSettings("discrete", -3),
+        "ring": RingSettings("discrete", -3, "nicked"),
         "continuum": ContinuumSettings(11, 30, 5),
         "run": RunSettings(True, 7, 3, True, True),
     }

@@ -82,6 +82,25 @@ def test_table_for_people_names_both_models(capsys):
     assert "continuum" not in out
 
 
+@pytest.mark.parametrize("angles", ["trifonov2", "olson1998"])
+def test_freed_ends_cost_less_and_have_no_link(capsys, angles):
+    lowest = {}
+    for ends in ("ring", "nicked", "hinged"):
+        arguments = ["11T15", "--ends", ends, "--angles", angles, "--model", "discrete", "--json"]
+        code, out, _ = run(capsys, *arguments)
+        record = json.loads(out)
+        assert code == 0
+        lowest[ends] = record["equilibria"][0]
+        assert set(lowest[ends]) == KEYS
+        assert lowest[ends]["stable"]
+        assert lowest[ends]["smallest_eigenvalue"] > 0.0
+    assert lowest["ring"]["link"] == 15
+    assert lowest["nicked"]["link"] is None
+    assert lowest["hinged"]["link"] is None
+    energies = [lowest[ends]["energy_RT"] for ends in ("ring", "nicked", "hinged")]
+    assert energies == sorted(energies, reverse=True)
+
+
 def test_a_bad_record_is_named_and_the_rest_go_on(capsys, tmp_path):
     letters = embedded("08T15").sequence.letters
     fasta = tmp_path / "some.fasta"
@@ -104,6 +123,8 @@ def test_a_bad_record_is_named_and_the_rest_go_on(capsys, tmp_path):
         (["11T15", "--angles", "none-such"], "none-such"),
         (["11T15", "--a-tracts", "150..160"], "157"),
         (["11T15", "--structure", "ring.xyz", "--model", "discrete"], ".pdb, .gro or .cif"),
+        (["11T15", "--ends", "nicked", "--link", "15"], "--link 15"),
+        (["11T15", "--ends", "hinged", "--model", "continuum"], "--model discrete"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(capsys, arguments, words):

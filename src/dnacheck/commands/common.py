@@ -74,6 +74,8 @@ class RingSettings:
 
     model: Literal["continuum", "discrete", "both"]
     link: Literal["auto", "all"] | int
+    ends: str
+    """What the end is held to: ring, nicked or hinged."""
 
 
 @dataclass(frozen=True)
@@ -267,8 +269,20 @@ def model_options(function: Function) -> Function:
     )
 
 
+def ends_option(name: str) -> Callable[[Function], Function]:
+    """``--ends``, which a command receives as ``name``."""
+    return click.option(
+        "--ends",
+        name,
+        type=click.Choice(["ring", "nicked", "hinged"]),
+        default="ring",
+        show_default=True,
+        help="How the end meets the start: closed, free to turn about its axis, or in any way.",
+    )
+
+
 def ring_options(function: Function) -> Function:
-    """Give a command ``--model`` and ``--link``; it receives ``ring``."""
+    """Give a command ``--model``, ``--link`` and ``--ends``; it receives ``ring``."""
     return _gathered(
         function,
         "ring",
@@ -290,6 +304,7 @@ def ring_options(function: Function) -> Function:
                 show_default=True,
                 help="Links to search.",
             ),
+            ends_option("ring__ends"),
         ],
     )
 

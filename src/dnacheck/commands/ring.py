@@ -118,6 +118,8 @@ def _solve(
     if chain.rigid and ring.model == "both":
         warnings.append("continuum: left out, for steps of six parameters have none yet")
         ring = replace(ring, model="discrete")
+    if ring.ends != "ring":
+        ring = _discrete_only(ring, warnings)
     equilibria: list[dict[str, Any]] = []
     smooth = discrete = None
     converged = True
@@ -152,12 +154,32 @@ def _solve(
     return record, converged, (chain, smooth, discrete)
 
 
+def _discrete_only(ring: RingSettings, warnings: list[str]) -> RingSettings:
+    """The settings for ends that the continuum rod does not know."""
+    from dnacheck.numerics.outcome import InputError
+
+    if ring.model == "continuum":
+        raise InputError(
+            f"--model continuum: the rod is closed to a ring alone; give --model discrete for "
+            f"--ends {ring.ends}"
+        )
+    if isinstance(ring.link, int):
+        raise InputError(
+            f"--link {ring.link}: {ring.ends} ends are free to turn and have no link; leave it out"
+        )
+    if ring.model == "both":
+        warnings.append(f"continuum: left out, for the rod has no {ring.ends} ends yet")
+    return replace(ring, model="discrete")
+
+
 def _discrete(
     chain: Chain, ring: RingSettings, warnings: list[str]
 ) -> tuple[DiscreteRing | None, list[dict[str, Any]]]:
-    from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
+    from dnacheck.equilibria.boundary import ENDS
+    from dnacheck.equilibria.discrete.boundary_search import find_equilibria
+    from dnacheck.equilibria.discrete.search import SearchOptions
 
-    found = find_rings(chain, SearchOptions(links=ring.link))
+    found = find_equilibria(chain, ENDS[ring.ends], SearchOptions(links=ring.link))
     if found.failed_starts:
         warnings.append(
             f"discrete: {found.failed_starts} of {found.starts} starts did not converge; "
@@ -175,7 +197,7 @@ def _discrete(
             "energy_reduced": item.energy,
             "bend_RT": item.bend_RT,
             "twist_RT": item.twist_RT,
-            "link": item.link,
+            "link": item.ring_link,
             "writhe": item.writhe,
             "stable": item.stable,
             "smallest_eigenvalue": item.smallest_eigenvalue,
@@ -189,10 +211,11 @@ def _discrete(
     lowest = found.lowest
     close = [e for e in entries[1:] if e["energy_RT"] - lowest.energy_RT < _CLOSE_RT]
     if close:
-        links = ", ".join(str(entry["link"]) for entry in close)
+        links = ", ".join(str(entry["link"]) for entry in close if entry["link"] is not None)
         warnings.append(
-            f"discrete: {len(close)} more minima within {_CLOSE_RT:g} RT of the lowest (link "
-            f"{links}); all of them count for J"
+            f"discrete: {len(close)} more minima within {_CLOSE_RT:g} RT of the lowest"
+            + (f" (link {links})" if links else "")
+            + "; all of them count for J"
         )
     if lowest.smallest_eigenvalue * chain.energy_scale_RT < _SOFT_RT:
         warnings.append(
@@ -282,7 +305,7 @@ def _print(record: dict[str, Any]) -> None:
             f"{item['energy_reduced']:.6f}",
             f"{item['bend_RT']:.4f}",
             f"{item['twist_RT']:.4f}",
-            str(item["link"]),
+            "-" if item["link"] is None else str(item["link"]),
             f"{item['writhe']:+.4f}",
             stable,
             f"{item['residual']:.0e}",

@@ -17,7 +17,6 @@ from dnacheck.model.chain import Chain, chain_frames, elastic_energy, energy_par
 from dnacheck.numerics.curve_topology import (
     edge_frames,
     link_of_ring,
-    polygon_writhe,
     total_twist,
 )
 from dnacheck.numerics.outcome import InputError, SolveError, Status
@@ -198,12 +197,15 @@ def _topology(
         along = np.empty_like(frames)
         edge_frames(centres, frames, along)
         frames = along
-    if boundary != RING:
-        meets = not isinstance(boundary, (Loop, Pull))
-        writhe = float(polygon_writhe(centres[:-1])) if meets else math.nan
-        return None, float(total_twist(frames)), writhe
-    link, twist, writhe = link_of_ring(centres, frames)
-    return int(link), float(twist), float(writhe)
+    if boundary == RING:
+        link, twist, writhe = link_of_ring(centres, frames)
+        return int(link), float(twist), float(writhe)
+    if isinstance(boundary, (Loop, Pull)):
+        return None, float(total_twist(frames)), math.nan
+    # Any framing that closes tells the writhe of the polygon.
+    closed = frames.copy()
+    closed[-1] = closed[0]
+    return None, float(total_twist(frames)), float(link_of_ring(centres, closed)[2])
 
 
 def make_ring(
