@@ -60,11 +60,14 @@ class SearchPlan(NamedTuple):
         Further registers to start from, in radians from the predicted one.
     window : float
         Links whose minimum lies so far (reduced energy) above the lowest start only once.
+    near : float
+        Those that lie so far above it do not start from the further registers.
     """
 
     links: Any
     registers: Any
     window: float
+    near: float
 
 
 class Minima(NamedTuple):
@@ -221,7 +224,8 @@ def search_as_cut(
         reach = _register_rows(steps, link, along, across)
         known = KnownRegister(along, across, registers[i], reach)
         second = False
-        for k in range(_SECOND + plan.registers.shape[0]):
+        further = plan.registers.shape[0] if energies[i] <= lowest + plan.near else 0
+        for k in range(_SECOND + further):
             if k == 0:
                 if choices[i] < 2:
                     continue
