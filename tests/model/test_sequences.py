@@ -2,11 +2,17 @@
 
 import csv
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dnacheck.model.a_tracts import automatic_regions, parse_regions, tract_regions
+from dnacheck.model.a_tracts import (
+    automatic_regions,
+    parse_regions,
+    region_steps,
+    tract_regions,
+)
 from dnacheck.model.data_files import data_directory
 from dnacheck.model.molecules import embedded, embedded_names
 from dnacheck.model.sequence import STEP_NAMES, Sequence, parse_sequence
@@ -70,14 +76,52 @@ def test_published_tables_speak_of_the_same_molecules():
 def test_the_tract_rule_gives_the_regions_that_table_2_demands():
     for name in embedded_names():
         molecule = embedded(name)
-        assert automatic_regions(molecule.sequence.letters) == molecule.a_tract_regions
+        for closed in (True, False):
+            assert automatic_regions(molecule.sequence.letters, closed) == molecule.a_tract_regions
 
 
 def test_tract_rule_parts_distant_tracts_and_stays_inside():
-    assert automatic_regions("A" * 6 + "C" * 21 + "T" * 7) == ((0, 33),)
-    assert automatic_regions("A" * 6 + "C" * 22 + "T" * 7) == ((0, 7), (26, 34))
+    assert automatic_regions("A" * 6 + "C" * 21 + "T" * 7, closed=False) == ((0, 33),)
+    assert automatic_regions("A" * 6 + "C" * 22 + "T" * 7, closed=False) == ((0, 7), (26, 34))
+    assert automatic_regions("ACGT" * 10, closed=False) == ()
+    assert tract_regions("CC" + "A" * 6 + "CC", closed=False) == ((2, 6),)
+    assert tract_regions("AACCAAA", closed=False) == ()
+
+
+def test_in_a_ring_the_tract_rule_knows_no_first_base_pair():
+    # A run of six across the joint, 30 base pairs from itself.
+    assert automatic_regions("AAA" + "C" * 30 + "AAA") == ((31, 4),)
+    assert tract_regions("AAA" + "C" * 30 + "AAA") == ((33, 1),)
+    # Two runs 21 apart across the joint are one region, 22 apart are two.
+    assert automatic_regions("C" * 10 + "A" * 6 + "C" * 40 + "T" * 6 + "C" * 11) == ((54, 17),)
+    assert len(automatic_regions("C" * 10 + "A" * 6 + "C" * 40 + "T" * 6 + "C" * 12)) == 2
+    # A region beside the joint reaches two steps past it.
+    assert automatic_regions("A" * 6 + "C" * 40) == ((44, 7),)
+    # A run that comes within 21 base pairs of itself, and a ring of one letter, are all region.
+    assert automatic_regions("A" * 6 + "C" * 21) == ((0, 26),)
+    assert automatic_regions("T" * 30) == tract_regions("T" * 30) == ((0, 29),)
     assert automatic_regions("ACGT" * 10) == ()
-    assert tract_regions("CC" + "A" * 6 + "CC") == ((2, 6),)
+
+
+@pytest.mark.parametrize("rule", [automatic_regions, tract_regions])
+def test_the_tract_rule_turns_with_the_ring(rule):
+    rng = np.random.default_rng(3)
+    crossing = 0
+    for _ in range(200):
+        n = int(rng.integers(40, 160))
+        letters = list(rng.choice(list("ACGT"), n))
+        for start in rng.integers(0, n, 4):
+            for k in range(int(rng.integers(5, 9))):
+                letters[(start + k) % n] = "AT"[int(start) % 2]
+        text = "".join(letters)
+        here = {int(s) for region in rule(text) for s in region_steps(region, n)}
+        for cut in rng.integers(1, n, 5):
+            there = rule(text[cut:] + text[:cut])
+            steps = {(int(s) + int(cut)) % n for r in there for s in region_steps(r, n)}
+            assert steps == here
+            crossing += any(first > last for first, last in there)
+    # Negative control: the sample has regions that the written ends part.
+    assert crossing > 50
 
 
 @pytest.mark.parametrize("text", ["5", "a..b", "7..3", "0..20", "1..2,", "-1..3"])

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dnacheck.model.a_tracts import region_steps
 from dnacheck.model.chain import Chain, uniform_stiffness
 from dnacheck.model.sequence import STEP_NAMES, reverse_complement
 from dnacheck.model.sequence import Sequence as Letters
@@ -154,12 +155,8 @@ def own_value(chain: Chain, name: str) -> float:
 
 def _in_tract(chain: Chain) -> NDArray[np.bool_]:
     inside = np.zeros(chain.n_steps, dtype=bool)
-    for first, last in chain.a_tract_regions:
-        if first <= last:
-            inside[first : last + 1] = True
-        else:  # a region that goes on across the joint
-            inside[first:] = True
-            inside[: last + 1] = True
+    for region in chain.a_tract_regions:
+        inside[region_steps(region, chain.n_steps)] = True
     return inside
 
 

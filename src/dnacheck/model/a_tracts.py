@@ -2,8 +2,9 @@
 
 Rule ``auto``: a run is six or more A, or six or more T, in a row. Runs at most two helical turns
 (21 bp) apart belong to one tract region. A region reaches from two steps before the first base
-pair of its first run to two steps past the last base pair of its last run, cut at the ends of the
-molecule. On the eleven molecules of Table II this reproduces the regions that their published
+pair of its first run to two steps past the last base pair of its last run. A ring has no ends: its
+runs and regions go on across its first base pair; those of an open chain are cut at its ends. On
+the eleven molecules of Table II this reproduces the regions that their published
 energies demand (``data/molecules/kahn_crothers.fasta``). With ``tracts-only`` the region is just
 the steps inside each run, the reading that meets the paper's Monte Carlo column best.
 """
@@ -11,6 +12,9 @@ the steps inside each run, the reading that meets the paper's Monte Carlo column
 from __future__ import annotations
 
 import re
+
+import numpy as np
+from numpy.typing import NDArray
 
 from dnacheck.numerics.outcome import InputError
 
@@ -22,28 +26,66 @@ FLANK = 2
 """Steps beyond a region's outer runs that take its twist."""
 
 Region = tuple[int, int]
-"""First and last step of a region, counted from 0, both included."""
+"""First and last step of a region, counted from 0, both included. A region of a ring that goes on
+across the first base pair has its first step after its last."""
 
-_RUN = re.compile(f"A{{{SHORTEST_RUN},}}|T{{{SHORTEST_RUN},}}")
+
+def region_steps(region: Region, n_steps: int) -> NDArray[np.intp]:
+    """Indices of a region's steps in a molecule of ``n_steps``."""
+    first, last = region
+    return np.arange(first, last + 1 if first <= last else last + 1 + n_steps) % n_steps
 
 
-def automatic_regions(letters: str) -> tuple[Region, ...]:
-    """Regions that rule ``auto`` of this module finds, in order along the molecule."""
+def automatic_regions(letters: str, closed: bool = True) -> tuple[Region, ...]:
+    """Regions that rule ``auto`` of this module finds, in order along the molecule.
+
+    ``closed`` tells a ring from an open chain.
+    """
+    n = len(letters)
+    origin, runs = _runs(letters, SHORTEST_RUN, closed)
     regions: list[list[int]] = []
-    for match in _RUN.finditer(letters):
-        first, last = match.start(), match.end() - 1
+    for first, last in runs:
         if regions and first - regions[-1][1] - 1 <= LARGEST_GAP:
             regions[-1][1] = last
         else:
             regions.append([first, last])
-    steps = len(letters)
-    return tuple((max(0, a - FLANK), min(steps - 1, b + FLANK)) for a, b in regions)
+    if not closed:
+        return tuple((max(0, a - FLANK), min(n - 1, b + FLANK)) for a, b in regions)
+    if regions and regions[0][0] + n - regions[-1][1] - 1 <= LARGEST_GAP:
+        if len(regions) == 1:
+            return ((0, n - 1),)
+        regions[0][0] = regions.pop()[0] - n
+    return _from_origin([(a - FLANK, b + FLANK) for a, b in regions], origin, n)
 
 
-def tract_regions(letters: str) -> tuple[Region, ...]:
+def tract_regions(letters: str, closed: bool = True) -> tuple[Region, ...]:
     """Steps inside each run of at least five equal A or T: five steps in a run of six."""
-    pattern = re.compile(f"A{{{SHORTEST_RUN - 1},}}|T{{{SHORTEST_RUN - 1},}}")
-    return tuple((m.start(), m.end() - 2) for m in pattern.finditer(letters))
+    n = len(letters)
+    origin, runs = _runs(letters, SHORTEST_RUN - 1, closed)
+    if closed and runs == [(0, n - 1)]:
+        return ((0, n - 1),)
+    return _from_origin([(a, b - 1) for a, b in runs], origin, n)
+
+
+def _runs(letters: str, shortest: int, closed: bool) -> tuple[int, list[Region]]:
+    """Where counting starts, and first and last base pair of every run, counted from there.
+
+    A ring is counted from a place where a run may end, so that none is parted.
+    """
+    origin = 0
+    if closed:
+        changes = (i for i in range(len(letters)) if letters[i - 1] != letters[i])
+        origin = next(changes, 0)
+    turned = letters[origin:] + letters[:origin]
+    pattern = re.compile(f"A{{{shortest},}}|T{{{shortest},}}")
+    return origin, [(m.start(), m.end() - 1) for m in pattern.finditer(turned)]
+
+
+def _from_origin(regions: list[Region], origin: int, n: int) -> tuple[Region, ...]:
+    """Regions counted from ``origin`` as the molecule is written, in order."""
+    if any(last - first + 1 >= n for first, last in regions):
+        return ((0, n - 1),)
+    return tuple(sorted(((a + origin) % n, (b + origin) % n) for a, b in regions))
 
 
 def parse_regions(text: str, n_steps: int) -> tuple[Region, ...]:

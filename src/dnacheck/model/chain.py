@@ -14,7 +14,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dnacheck.model.a_tracts import Region, automatic_regions, parse_regions, tract_regions
+from dnacheck.model.a_tracts import (
+    Region,
+    automatic_regions,
+    parse_regions,
+    region_steps,
+    tract_regions,
+)
 from dnacheck.model.chain_kernels import MIDSTEP, WEDGE, HingeSteps, fill_angles, fill_frames
 from dnacheck.model.molecules import Molecule
 from dnacheck.model.parameters import ParameterSet, load_parameters
@@ -65,7 +71,8 @@ class Chain:
         How the coordinates make a step: three angles as the paper's wedge (2.1) or its mid-step
         form, or six parameters.
     a_tract_regions : tuple of (first, last)
-        Steps that took the A-tract twist, from 0, both ends included.
+        Steps that took the A-tract twist, from 0, both ends included; of a region that goes on
+        across the first base pair the first step comes after the last.
     """
 
     name: str
@@ -199,7 +206,9 @@ def uniform_stiffness(n_steps: int, twist_ratio: float) -> Array:
     return np.tile(np.diag([float(twist_ratio), 1.0, 1.0]), (n_steps, 1, 1))
 
 
-def _regions(molecule: Molecule, choice: str | tuple[Region, ...]) -> tuple[Region, ...]:
+def _regions(
+    molecule: Molecule, choice: str | tuple[Region, ...], closed: bool
+) -> tuple[Region, ...]:
     letters = molecule.sequence.letters
     if not isinstance(choice, str):
         return parse_regions(",".join(f"{a}..{b}" for a, b in choice), len(letters))
@@ -207,9 +216,9 @@ def _regions(molecule: Molecule, choice: str | tuple[Region, ...]) -> tuple[Regi
         return ()
     if choice == "auto":
         known = molecule.a_tract_regions
-        return automatic_regions(letters) if known is None else known
+        return automatic_regions(letters, closed) if known is None else known
     if choice == "tracts-only":
-        return tract_regions(letters)
+        return tract_regions(letters, closed)
     return parse_regions(choice, len(letters))
 
 
@@ -221,6 +230,7 @@ def build_chain(
     rise_A: float | None = None,
     a_tracts: str | tuple[Region, ...] = "auto",
     step_form: StepForm = "wedge",
+    closed: bool = True,
 ) -> Chain:
     """Chain of a molecule from its letters and a parameter set.
 
@@ -237,9 +247,13 @@ def build_chain(
         Give the energy unit K_theta = RT P/l; in Å, 463 and 3.4 by default. Not allowed for rigid
         steps, which bring lengths and energies of their own.
     a_tracts : "auto", "tracts-only", "none", "A..B", or regions
-        Steps that take the set's A-tract twist; without effect for a set that has none.
+        Steps that take the set's A-tract twist; without effect for a set that has none. The
+        embedded molecules have theirs from data, others by rule.
     step_form : {"wedge", "midstep"}
         The paper's wedge, or its form symmetrised in the strands. Of no effect for rigid steps.
+    closed : bool
+        Whether the A-tract rule goes on across the first base pair, as in a ring, nicked or not,
+        or stops at the ends, as in an open chain or a loop.
 
     Raises
     ------
@@ -253,9 +267,9 @@ def build_chain(
     ground = table.ground[rows]
     regions: tuple[Region, ...] = ()
     if table.a_tract_twist is not None:
-        regions = _regions(molecule, a_tracts)
-        for first, last in regions:
-            ground[first : last + 1, 0] = table.a_tract_twist
+        regions = _regions(molecule, a_tracts, closed)
+        for region in regions:
+            ground[region_steps(region, len(ground)), 0] = table.a_tract_twist
     elif a_tracts not in ("auto", "none"):
         raise InputError(f"parameter set '{table.name}' has no A-tract twist; use a_tracts none")
     if table.kind == "rigid":
