@@ -53,7 +53,10 @@ def scan_molecule(
     n = steps.ground.shape[0]
     ring = rotated(steps, least_rotation(steps))
     minima = Minima(
-        np.empty((most, n, steps.ground.shape[1])), np.empty((most, 6)), np.empty((most, N_FIGURES))
+        np.empty((most, n, steps.ground.shape[1])),
+        np.empty((most, 6)),
+        np.empty((most, N_FIGURES)),
+        np.zeros(len(plan.links), dtype=np.bool_),
     )
     found, _, failed = search_as_cut(ring, plan, limits, minima)
     figures[:] = math.nan

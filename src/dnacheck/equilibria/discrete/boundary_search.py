@@ -112,7 +112,7 @@ def _solutions(
     # The link only sets the excess twist: none, where the end is free to turn.
     registers = np.empty(3)
     turns = np.empty((2, chain.n_steps + 1, 3))
-    count, _ = predicted_registers(chain.arrays, chain.relaxed_turns, registers, turns)
+    count, _, _ = predicted_registers(chain.arrays, chain.relaxed_turns, registers, turns)
     chosen = [registers[0], registers[1] if count == 2 else registers[0] + math.pi]
     if isinstance(boundary, HingedRing):
         for ring in _solutions(chain, NickedRing(), everything, newton):

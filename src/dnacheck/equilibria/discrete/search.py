@@ -33,6 +33,9 @@ LinkChoice = Literal["auto", "all"] | int
 _WINDOW_RT = 8.0
 """Minima this far above the lowest change J by less than a part in a thousand; links and
 registers beyond it are not searched by ``auto``."""
+_PREDICTED_WINDOW_RT = 10.0
+"""Links whose planar ring, relaxed as predicted, lies so far above the lowest are not started from
+by ``auto``."""
 _MOST_LINKS = 64
 _MOST_MINIMA = 64
 _ALL_LINKS_REACH = 2
@@ -164,13 +167,16 @@ def search_plan(chain: Chain, links: LinkChoice = "auto") -> SearchPlan:
         near = np.array(candidate_links(chain), dtype=np.int64)
         more = _RIGID_REGISTERS if chain.rigid else np.empty(0)
         unit = chain.energy_scale_RT
-        return SearchPlan(near, more, _WINDOW_RT / unit, _RIGID_WINDOW_RT / unit)
+        return SearchPlan(
+            near, more, _WINDOW_RT / unit, _RIGID_WINDOW_RT / unit, _PREDICTED_WINDOW_RT / unit
+        )
     if links == "all":
         nearest = round(chain.relaxed_turns)
         around = range(nearest - _ALL_LINKS_REACH, nearest + _ALL_LINKS_REACH + 1)
         every = sorted({*around, *candidate_links(chain)})
-        return SearchPlan(np.array(every, dtype=np.int64), registers, math.inf, math.inf)
-    return SearchPlan(np.array([links], dtype=np.int64), registers, math.inf, math.inf)
+        return SearchPlan(np.array(every, dtype=np.int64), registers, math.inf, math.inf, math.inf)
+    one = np.array([links], dtype=np.int64)
+    return SearchPlan(one, registers, math.inf, math.inf, math.inf)
 
 
 def room(plan: SearchPlan) -> int:
@@ -214,6 +220,7 @@ def search_minima(
         np.asarray(registers, dtype=float),
         float(window),
         float(window),
+        math.inf,
     )
     return _searched(chain, plan, options)
 
@@ -221,7 +228,10 @@ def search_minima(
 def _searched(chain: Chain, plan: SearchPlan, options: NewtonOptions) -> RingSearch:
     most = room(plan)
     minima = Minima(
-        np.empty((most, *chain.ground.shape)), np.empty((most, 6)), np.empty((most, nk.N_FIGURES))
+        np.empty((most, *chain.ground.shape)),
+        np.empty((most, 6)),
+        np.empty((most, nk.N_FIGURES)),
+        np.zeros(len(plan.links), dtype=bool),
     )
     began = time.perf_counter()
     found, starts, failed = search(
@@ -244,7 +254,7 @@ def _searched(chain: Chain, plan: SearchPlan, options: NewtonOptions) -> RingSea
     return RingSearch(
         chain=chain,
         equilibria=rings,
-        links_searched=tuple(int(link) for link in plan.links),
+        links_searched=tuple(int(link) for link in plan.links[minima.tried]),
         starts=starts,
         failed_starts=failed,
         seconds=seconds,

@@ -62,12 +62,16 @@ class SearchPlan(NamedTuple):
         Links whose minimum lies so far (reduced energy) above the lowest start only once.
     near : float
         Those that lie so far above it do not start from the further registers.
+    far : float
+        Links predicted to lie so far above the lowest do not start at all, unless no other link
+        has a ring.
     """
 
     links: Any
     registers: Any
     window: float
     near: float
+    far: float
 
 
 class Minima(NamedTuple):
@@ -79,11 +83,14 @@ class Minima(NamedTuple):
     multipliers : ndarray, shape (M, 6)
     figures : ndarray, shape (M, 8)
         See :func:`dnacheck.equilibria.discrete.kernels.newton.newton`.
+    tried : ndarray of bool, shape (L,)
+        Links of the plan that were started from.
     """
 
     angles: Any
     multipliers: Any
     figures: Any
+    tried: Any
 
 
 @njit(cache=True, nogil=True)
@@ -92,8 +99,10 @@ def _fill_hinge_circle(steps: HingeSteps, link: int, register: float, angles: An
 
 
 @njit(cache=True, nogil=True)
-def _rigid_predicted(steps: RigidSteps, link: int, registers: Any, turns: Any) -> tuple[int, float]:
-    return rigid_registers(steps, link, registers), math.inf
+def _rigid_predicted(
+    steps: RigidSteps, link: int, registers: Any, turns: Any
+) -> tuple[int, float, float]:
+    return rigid_registers(steps, link, registers), math.inf, 0.0
 
 
 @njit(cache=True, nogil=True)
@@ -199,10 +208,24 @@ def search_as_cut(
     lacking = np.empty(count)
     registers = np.zeros(count)
     energies = np.full(count, math.inf)
+    predicted = np.empty(count)
     lowest = math.inf
     for i in range(count):
-        link = plan.links[i]
-        choices[i], lacking[i] = predicted_registers(steps, link, rests[i], turns[i])
+        choices[i], lacking[i], predicted[i] = predicted_registers(
+            steps, plan.links[i], rests[i], turns[i]
+        )
+        minima.tried[i] = False
+    ceiling = math.inf
+    for i in range(count):
+        # A prediction that is not a number sets no ceiling and is below any.
+        if predicted[i] + plan.far < ceiling:
+            ceiling = predicted[i] + plan.far
+    for k in range(2 * count):
+        i, link = k % count, plan.links[k % count]
+        # Links far above the lowest have a second turn, if no other led to a ring.
+        if minima.tried[i] or (found > 0 if k >= count else predicted[i] > ceiling):
+            continue
+        minima.tried[i] = True
         for attempt in range(1 + len(_INSTEAD)):
             start = rests[i, 0]
             if attempt > 0:

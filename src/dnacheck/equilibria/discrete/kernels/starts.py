@@ -24,6 +24,8 @@ _SAMPLES = 32
 _HELD = 0.02
 # Relaxing turns no frame of a starting shape by more than this, in radians.
 _LARGEST_TURN = 0.5
+# Where it would turn one by more than this, the first order is no guide to the energy.
+_RELIABLE_TURN = 1.0
 # Registers so far (rad) from the lowest predicted one may hold another minimum.
 _AWAY = 1.2
 
@@ -91,7 +93,9 @@ def circle_frames(ground: Any, link: int, register: float, frames: Any) -> None:
 
 
 @njit(cache=True, nogil=True)
-def circle_registers(steps: HingeSteps, link: int, registers: Any, turns: Any) -> tuple[int, float]:
+def circle_registers(
+    steps: HingeSteps, link: int, registers: Any, turns: Any
+) -> tuple[int, float, float]:
     """Registers at which a planar ring of a link is predicted to rest, lowest first.
 
     Rolling the molecule by a register psi inside a planar ring costs v^T Q v with
@@ -112,10 +116,12 @@ def circle_registers(steps: HingeSteps, link: int, registers: Any, turns: Any) -
     lacking : what the curve lacks of a minimum at the shoulder, relative to a circle's energy: the
         least amplitude of a further term that could make one, were its slope at most three and
         its curvature six times as large.
+    energy : predicted for the lowest, reduced; NaN near the instability of a twisted ring, where
+        the first order is no guide.
     """
     ground, stiffness = steps.ground, steps.stiffness
     q = np.empty((3, 3))
-    _roll_energy(ground, stiffness, steps.form, link, q, turns)
+    reliable = _roll_energy(ground, stiffness, steps.form, link, q, turns)
     # The curve is constant + a cos psi + b sin psi + c cos 2 psi + d sin 2 psi.
     a, b = q[0, 1] + q[1, 0], q[0, 2] + q[2, 0]
     c, d = 0.5 * (q[1, 1] - q[2, 2]), 0.5 * (q[1, 2] + q[2, 1])
@@ -157,17 +163,19 @@ def circle_registers(steps: HingeSteps, link: int, registers: Any, turns: Any) -
     for s in range(ground.shape[0]):
         circle += 0.5 * (stiffness[s, 1, 1] + stiffness[s, 2, 2])
     circle *= 2.0 * math.pi**2 / ground.shape[0] ** 2
-    return count, lacking / circle
+    mean = q[0, 0] + 0.5 * (q[1, 1] + q[2, 2])
+    return count, lacking / circle, mean + energies[lowest] if reliable else math.nan
 
 
 @njit(cache=True, nogil=True)
 def _roll_energy(
     ground: Any, stiffness: Any, form: int, link: int, quadratic: Any, turns: Any
-) -> None:
+) -> bool:
     """Energy of a planar ring as a quadratic form (3, 3) in (1, cos psi, sin psi).
 
     Seen from the ring, rolling turns the ground bends and leaves everything else. The relaxation
     leaves out the roll itself, which costs nothing to the straight molecule it starts from.
+    Returns whether it turns no frame by more than a first order may.
     """
     n = ground.shape[0]
     mean = np.zeros((n, 3, 3))
@@ -221,7 +229,8 @@ def _roll_energy(
     )
     turns[:] = 0.0
     if held < 0.0:
-        return
+        return False
+    reliable = True
     for i in range(2):
         along = 0.0
         for s in range(n):
@@ -234,17 +243,18 @@ def _roll_energy(
         solve_small(small, -small[:, 6], float(n), target)
         back_substitute(factors, target, 1.0, step)
         _accumulate(state.axes, step, turns[i])
-        # Near the instability of a twisted ring the first order is no guide.
         largest = 0.0
         for s in range(n + 1):
             for j in range(3):
                 largest = max(largest, abs(turns[i, s, j]))
         if largest > _LARGEST_TURN:
             turns[i] *= _LARGEST_TURN / largest
+        reliable = reliable and largest <= _RELIABLE_TURN
         for j in range(2):
             for s in range(n):
                 gain = pulls[j, s, 0] * step[s, 0] + pulls[j, s, 1] * step[s, 1]
                 quadratic[1 + i, 1 + j] += 0.5 * (gain + pulls[j, s, 2] * step[s, 2])
+    return reliable
 
 
 @njit(cache=True, nogil=True)
