@@ -12,6 +12,8 @@ import importlib
 import io
 import os
 import sys
+import threading
+import time
 import traceback
 from collections.abc import Sequence
 
@@ -104,13 +106,23 @@ def main(argv: Sequence[str] | None = None) -> int:
         return EXIT_BROKEN_PIPE
     except BaseException as error:
         code = _report(error, debug="--debug" in arguments)
-    return _flushed(code)
+    code = _flushed(code)
+    if argv is None and _leaves_work_behind():
+        os._exit(code)
+    return code
+
+
+def _leaves_work_behind() -> bool:
+    """Whether kernels run on past a time limit: Python would wait for them at its exit."""
+    from dnacheck.commands.time_limit import LEFT_BEHIND
+
+    return any(thread.name == LEFT_BEHIND for thread in threading.enumerate())
 
 
 def _run(arguments: list[str]) -> int:
     """Parse and invoke; the exit code is what the command returned, None meaning 0."""
     try:
-        with cli.make_context("dnacheck", arguments) as context:
+        with cli.make_context("dnacheck", arguments, obj=time.perf_counter()) as context:
             outcome = cli.invoke(context)
     except click.exceptions.Exit as stop:
         return stop.exit_code
@@ -146,7 +158,7 @@ def _flushed(code: int) -> int:
 def _explain(error: BaseException, debug: bool) -> tuple[int, str]:
     """Exit code and message of an exception."""
     # Imported here: help and usage errors of a healthy run do not need it.
-    from dnacheck.numerics.outcome import InputError, SolveError
+    from dnacheck.numerics.outcome import InputError, SolveError, TimeLimitReachedError
 
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
         return EXIT_INPUT, error.format_message()
@@ -157,7 +169,7 @@ def _explain(error: BaseException, debug: bool) -> tuple[int, str]:
         return EXIT_INPUT, f"dnacheck: {_one_line(error.format_message())}"
     if isinstance(error, InputError):
         return EXIT_INPUT, f"dnacheck: {_one_line(str(error))}"
-    if isinstance(error, SolveError):
+    if isinstance(error, SolveError | TimeLimitReachedError):
         return EXIT_NOT_CONVERGED, f"dnacheck: {_one_line(str(error))}"
     if isinstance(error, KeyboardInterrupt | click.Abort):
         return EXIT_INTERRUPTED, "dnacheck: interrupted"

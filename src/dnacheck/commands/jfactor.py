@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -19,10 +18,12 @@ from dnacheck.commands.common import (
     target_argument,
 )
 from dnacheck.commands.output import note, print_json, progress
+from dnacheck.commands.time_limit import within
 from dnacheck.cyclization.methods import METHODS, method_named
 
 if TYPE_CHECKING:
     from dnacheck.cyclization.result import JFactor
+    from dnacheck.model.chain import Chain
 
 EXIT_BAD_INPUT = 2
 EXIT_NOT_CONVERGED = 3
@@ -48,7 +49,7 @@ EXIT_NOT_CONVERGED = 3
     "--max-seconds",
     type=PositiveNumber(),
     default=None,
-    help="Stop after this time with the best so far (exit code 3).",
+    help="Stop this long after the start with the best so far (exit code 3).",
 )
 @click.option(
     "--link", type=LinkChoice(), default="auto", show_default=True, help="Links to search."
@@ -71,12 +72,11 @@ def command(
     from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
     from dnacheck.io.sequences import read_target
     from dnacheck.model.chain import build_chain
-    from dnacheck.numerics.outcome import InputError, SolveError
+    from dnacheck.numerics.outcome import InputError, SolveError, TimeLimitReachedError
 
     records: list[dict[str, Any]] = []
     good = True
     way = method_named(method)
-    limit = math.inf if max_seconds is None else max_seconds
     molecules = list(read_target(target))
     if len(molecules) == 1 and isinstance(molecules[0], InputError):
         raise molecules[0]
@@ -88,7 +88,9 @@ def command(
             continue
         began = time.perf_counter()
         chain = build_chain(molecule, **model.chain_arguments())
-        try:
+
+        def compute(left: float, chain: Chain = chain) -> JFactor:
+            searching = time.perf_counter()
             search = find_rings(chain, SearchOptions(links=link))
             if isinstance(link, int):
                 # Raises where the link has no ring: no other's J may stand for it.
@@ -100,11 +102,13 @@ def command(
                     threads=run.threads,
                     progress=_by_difference(advance),
                     tolerance=tolerance,
-                    max_seconds=limit,
+                    max_seconds=max(left - (time.perf_counter() - searching), 1e-3),
                 )
-            if isinstance(link, int):
-                result = result.of_link(link, tolerance)
-        except SolveError as error:
+            return result.of_link(link, tolerance) if isinstance(link, int) else result
+
+        try:
+            result = within(max_seconds, compute)
+        except (SolveError, TimeLimitReachedError) as error:
             if run.json and len(molecules) == 1:
                 raise
             note(str(error), run.quiet)

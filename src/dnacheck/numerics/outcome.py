@@ -68,3 +68,7 @@ class SolveError(DnaCheckError):
     def __init__(self, message: str, partial: Any = None) -> None:
         super().__init__(message)
         self.partial = partial
+
+
+class TimeLimitReachedError(DnaCheckError):
+    """The time that a command was given is over."""
