@@ -11,7 +11,6 @@ from dnacheck.commands.common import (
     ModelSettings,
     RingSettings,
     RunSettings,
-    available_processors,
     common_options,
     continuum_options,
     model_options,
@@ -19,6 +18,7 @@ from dnacheck.commands.common import (
     target_argument,
 )
 from dnacheck.model.chain import build_chain
+from dnacheck.numerics.processors import available_processors
 
 
 @pytest.fixture(autouse=True)

@@ -22,6 +22,7 @@ from typing import Any, Literal, TypeVar
 import click
 
 from dnacheck.model.data_files import PARAMETER_SETS
+from dnacheck.numerics.processors import available_processors
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -140,14 +141,6 @@ class StepRange(click.ParamType):
         if first > last:
             self.fail(f"the first step {first} lies after the last step {last}", param, ctx)
         return first, last
-
-
-def available_processors() -> int:
-    """Processors that this process may use."""
-    try:
-        return max(1, len(os.sched_getaffinity(0)))
-    except AttributeError:  # not offered by every operating system
-        return os.cpu_count() or 1
 
 
 def limit_library_threads(threads: int) -> None:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from dnacheck.md import expressions
 from dnacheck.md.geometry import bead_count, beads_of_angles
 from dnacheck.model.chain import Chain
+from dnacheck.model.units import TEMPERATURE_K
 from dnacheck.numerics.outcome import InputError, SolveError
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ class BeadOptions:
     """Spring constants of the groove bead's distance, over distance², and of its angle."""
     centre_mass: float = 650.0
     """Mass of a centre, in dalton: about one base pair."""
-    temperature_K: float = 300.0
+    temperature_K: float = TEMPERATURE_K
     """Enters only the conversion of RT into OpenMM's kJ/mol, and the velocities."""
 
     def __post_init__(self) -> None:

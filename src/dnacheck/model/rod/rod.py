@@ -53,6 +53,8 @@ class Rod:
         Monitors of the natural frame, see :class:`NaturalFrame`.
     projection : float
         Largest angle in radians by which a d1 had to be turned into the normal plane.
+    letters : str
+        The molecule's letters, empty for a rod that no letters were given for.
     stiffness_anisotropy : float
         What an average of sequence-dependent stiffnesses left (0 for the uniform one).
     warnings : tuple of str
@@ -78,6 +80,7 @@ class Rod:
     frame_residual: float = 0.0
     projection: float = 0.0
     stiffness_anisotropy: float = 0.0
+    letters: str = ""
     warnings: tuple[str, ...] = ()
 
     @property
@@ -238,6 +241,7 @@ def build_rod(chain: Chain, options: RodOptions | None = None) -> Rod:
         frame_residual=natural.equation_residual,
         projection=projection,
         stiffness_anisotropy=max(stiffness.anisotropy, stiffness.coupling),
+        letters=chain.letters,
         warnings=_warnings(n, curve.rms_residual, options),
     )
 
