@@ -99,8 +99,8 @@ def continuum_rings():
 
     rod = build_rod(molecule(), ROD)
     found = lowest_continuum_ring(rod, options=ContinuumOptions(energy_tolerance=1e-5)).lowest
-    numbers = [found.energy, found.link, found.writhe, found.end_moment]
-    numbers += [*reconstruct(found).angles[3], *found.solution([0.3])[0]]
+    numbers = [found.energy, found.link, found.writhe, found.curve.end_moment]
+    numbers += [*reconstruct(found).angles[3], *found.curve.solution([0.3])[0]]
     return numbers
 
 
@@ -119,7 +119,7 @@ def families():
     coarse = ContinuationOptions(least_intervals=8, longest_step=0.3, max_points=12)
     branch = ratio_branch(rod, ring, Bounds(1.4, 1.6), coarse)
     numbers = [branch.energy[0], branch.energy[-1], len(branch)]
-    near = Bounds(ring.alpha - 0.2, ring.alpha + 0.2)
+    near = Bounds(ring.curve.alpha - 0.2, ring.curve.alpha + 0.2)
     component = imperfect_component(rod, ring, bounds=near, options=coarse)
     numbers += [component.branches[0].energy[-1], len(component.branches)]
     perfect = perfect_diagram(

@@ -1,6 +1,7 @@
 """Closed rings: two kinds of moves that share no argument must give one ensemble."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,7 +19,6 @@ from dnacheck.cyclization.ensembles.metropolis import (
 )
 from dnacheck.cyclization.half_chain.proposals import close_chain, linearised_closure
 from dnacheck.equilibria.discrete.search import find_rings
-from dnacheck.equilibria.discrete.solve import DiscreteRing
 from dnacheck.model.chain import Chain, chain_frames
 from dnacheck.numerics.outcome import InputError
 from dnacheck.numerics.random_numbers import random_state
@@ -229,7 +229,7 @@ def test_closing_a_chain_moves_it_least_in_the_norm_of_its_stiffness():
 def test_open_start_and_empty_moves_are_refused():
     chain = closed_ground_chain()
     ring = find_rings(chain).lowest
-    broken = DiscreteRing(**{**ring.__dict__, "closure": 0.1})
+    broken = replace(ring, solution=replace(ring.steps, closure=0.1))
     with pytest.raises(InputError, match="closed ring"):
         closed_ring_ensemble(chain, broken)
     with pytest.raises(InputError, match="no move"):

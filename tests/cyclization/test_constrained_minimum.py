@@ -13,7 +13,8 @@ from dnacheck.cyclization.laplace.isolated import laplace, register_spread
 from dnacheck.cyclization.laplace.kernels import register as rk
 from dnacheck.cyclization.laplace.kernels.gaussian import ROWS, draw_slice, invert_small
 from dnacheck.cyclization.laplace.register import register_laplace, register_profile
-from dnacheck.equilibria.discrete.search import RingSearch, find_rings
+from dnacheck.equilibria.discrete.search import find_rings
+from dnacheck.equilibria.ring import Equilibria
 from dnacheck.model.chain import Chain, build_chain, elastic_energy, uniform_stiffness
 from dnacheck.model.molecules import embedded
 from dnacheck.numerics.outcome import InputError, SolveError
@@ -177,7 +178,7 @@ def test_no_ring_at_all_is_said():
     chain = closed_ground_chain()
     search = find_rings(chain)
     with pytest.raises(SolveError, match="no stable ring"):
-        register_profile(RingSearch(chain, (), (), 0, 0, 0.0, search.status))
+        register_profile(Equilibria(chain, (), (), 0, 0, 0.0, search.status))
 
 
 @pytest.mark.parametrize(

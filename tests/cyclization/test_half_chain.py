@@ -23,7 +23,8 @@ from dnacheck.cyclization.half_chain.sampling import (
 )
 from dnacheck.cyclization.half_chain.window import crossed_error, polynomial_weights
 from dnacheck.cyclization.result import PER_CUBIC_ANGSTROM_IN_MOLAR, JStatus
-from dnacheck.equilibria.discrete.search import RingSearch, find_rings
+from dnacheck.equilibria.discrete.search import find_rings
+from dnacheck.equilibria.ring import Equilibria
 from dnacheck.model.chain import Chain, uniform_stiffness
 from dnacheck.numerics.outcome import InputError, SolveError
 
@@ -233,7 +234,7 @@ def test_no_pair_and_no_ring_are_errors():
     with pytest.raises(SolveError, match="draw more halves"):
         half_chain(chain, HalfChainOptions(halves=80, batches=4, radius=0.05, tilted=False), 0)
     none = find_rings(chain)
-    empty = RingSearch(chain, (), none.links_searched, none.starts, 0, 0.0, none.status)
+    empty = Equilibria(chain, (), none.links_searched, none.starts, 0, 0.0, none.status)
     with pytest.raises(SolveError, match="no stable ring"):
         half_chain(empty)
 

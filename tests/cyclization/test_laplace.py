@@ -15,7 +15,8 @@ from dnacheck.cyclization.laplace.isolated import (
     register_spread,
 )
 from dnacheck.cyclization.result import JFactor, JStatus, link_shares
-from dnacheck.equilibria.discrete.search import RingSearch, find_rings
+from dnacheck.equilibria.discrete.search import find_rings
+from dnacheck.equilibria.ring import Equilibria
 from dnacheck.model.chain import Chain, build_chain, elastic_energy, uniform_stiffness
 from dnacheck.model.molecules import embedded, embedded_names
 from dnacheck.numerics.outcome import InputError, SolveError
@@ -55,7 +56,7 @@ def test_equals_dense_algebra(form):
 def test_a_wrong_unit_of_length_would_be_seen():
     """Negative control of the comparison above: steps taken for ångström change ln J by 3 ln l."""
     ring = find_rings(soft_chain(14, 100.0)).lowest
-    other = replace(ring, chain=replace(ring.chain, rise_A=1.0, persistence_length_A=100.0))
+    other = replace(ring, source=replace(ring.chain, rise_A=1.0, persistence_length_A=100.0))
     assert laplace_log_j(other) - dense_log_j(ring) == pytest.approx(3 * math.log(3.4), abs=1e-4)
 
 
@@ -98,7 +99,7 @@ def test_a_soft_register_is_said():
 def test_no_ring_is_said():
     chain = closed_ground_chain()
     search = find_rings(chain)
-    none = RingSearch(chain, (), search.links_searched, 4, 4, 0.0, search.status)
+    none = Equilibria(chain, (), search.links_searched, 4, 4, 0.0, search.status)
     with pytest.raises(SolveError, match="no stable ring at links"):
         laplace(none)
 

@@ -63,19 +63,20 @@ def figure_seven(rod, chain) -> None:
         print(
             f"marked ring, link {ring.link}: {ring.energy_RT:.4f} RT, discrete "
             f"{discrete.energy_RT:.4f} RT ({100 * (ring.energy / discrete.energy - 1):+.3f} %), "
-            f"negative directions {ring.conjugate_points} and {discrete.negative_eigenvalues}"
+            f"negative directions {ring.negative_directions} and {discrete.negative_directions}"
         )
 
 
 def beside_auto(rod) -> None:
     """Energies and time per point."""
     ring = lowest_continuum_ring(rod).lowest
-    state = new_state(discretise(rod, ring.mesh, ring.degree))
-    state.slopes[:], state.loads[:], state.centres[:] = ring.slopes, ring.loads, ring.centres
+    state = new_state(discretise(rod, ring.curve.mesh, ring.curve.degree))
+    curve = ring.curve
+    state.slopes[:], state.loads[:], state.centres[:] = curve.slopes, curve.loads, curve.centres
     moved = transfer(state, np.linspace(0.0, 1.0, 51))
-    run_newton(moved, moved.disc.coefficients(), ring.alpha, ContinuumOptions())
+    run_newton(moved, moved.disc.coefficients(), ring.curve.alpha, ContinuumOptions())
     options = ContinuationOptions(tolerance=1e-7)
-    walker, spot = start_walker(moved.disc, end_twist(), options, ring.alpha, moved)
+    walker, spot = start_walker(moved.disc, end_twist(), options, ring.curve.alpha, moved)
     times = []
     for _ in range(5):
         began = time.process_time()
@@ -87,9 +88,11 @@ def beside_auto(rod) -> None:
         print("AUTO-07p: skipped: not installed")
         return
     start = ring_from(walker.disc, walker.active, spot.parameter, spot.loads, spot.slopes)
-    solution = start.solution(np.linspace(0.0, 1.0, 201))
-    exact = auto07p.follow_twist(rod, ring.alpha, solution, points=25, energy=True)
-    fine, first = start_walker(moved.disc, end_twist(), ContinuationOptions(), ring.alpha, moved)
+    solution = start.curve.solution(np.linspace(0.0, 1.0, 201))
+    exact = auto07p.follow_twist(rod, ring.curve.alpha, solution, points=25, energy=True)
+    fine, first = start_walker(
+        moved.disc, end_twist(), ContinuationOptions(), ring.curve.alpha, moved
+    )
     worst = 0.0
     for alpha, energy in zip(exact.alpha[1:], exact.energy[1:], strict=True):
         if alpha < exact.alpha.max():
@@ -98,7 +101,7 @@ def beside_auto(rod) -> None:
         else:
             break
     print(f"AUTO-07p: largest relative difference of energies {worst:.1e}")
-    auto = auto07p.follow_twist(rod, ring.alpha, solution, points=115)
+    auto = auto07p.follow_twist(rod, ring.curve.alpha, solution, points=115)
     print(f"AUTO-07p: {len(auto.alpha)} points, {1e3 * auto.seconds_per_point:.2f} ms per point")
     print(f"ratio of times per point, AUTO-07p / dnacheck: {auto.seconds_per_point / ours:.1f}")
 

@@ -96,7 +96,8 @@ def speed() -> None:
         oracle, oracle_ms = _equal_error(rod, link, exact, abs(ring.energy / exact - 1.0))
         print(
             f"{name:8s} {best:6.2f}  {median:6.2f}     {abs(ring.energy / exact - 1):.0e} "
-            f"{ring.intervals:4d}      {oracle_ms:8.1f}     {abs(oracle.energy / exact - 1):.0e} "
+            f"{ring.curve.intervals:4d}      {oracle_ms:8.1f}     "
+            f"{abs(oracle.energy / exact - 1):.0e} "
             f"{oracle.nodes:6d}   {oracle_ms / median:6.0f}"
         )
 
@@ -126,7 +127,7 @@ def oracle() -> None:
         other = scipy_bvp.solve(rod, link, tol=1e-8)
         print(
             f"{name:8s} {ring.energy:.12f}  {ring.energy / other.energy - 1:+.1e}      "
-            f"{(ring.energy_error or 0.0) / ring.energy:.1e}"
+            f"{(ring.curve.energy_error or 0.0) / ring.energy:.1e}"
         )
 
 
@@ -169,18 +170,18 @@ def stages() -> None:
     print("reconstruction        {:8.3f} {:8.3f}".format(*milliseconds(lambda: reconstruct(ring))))
     print(
         "solution at 160 points{:8.3f} {:8.3f}".format(
-            *milliseconds(lambda: ring.solution(np.linspace(0.0, 1.0, 160)))
+            *milliseconds(lambda: ring.curve.solution(np.linspace(0.0, 1.0, 160)))
         )
     )
     options = ContinuumOptions(max_iterations=1, tolerance=1e-13)
     for intervals, degree in ((14, 4), (30, 6), (50, 4)):
         disc = discretise(rod, aligned_mesh(rod.breaks, intervals), degree)
         state = new_state(disc)
-        start_from_perfect_ring(state, ring.alpha, register_roll(disc, ring.alpha))
-        run_newton(state, disc.coefficients(), ring.alpha, ContinuumOptions())
+        start_from_perfect_ring(state, ring.curve.alpha, register_roll(disc, ring.curve.alpha))
+        run_newton(state, disc.coefficients(), ring.curve.alpha, ContinuumOptions())
         coefficients = disc.coefficients()
         best, median = milliseconds(
-            lambda s=state, c=coefficients: run_newton(s, c, ring.alpha, options), 400
+            lambda s=state, c=coefficients: run_newton(s, c, ring.curve.alpha, options), 400
         )
         print(f"sweep, {intervals} x {degree}        {best:8.3f} {median:8.3f}")
 

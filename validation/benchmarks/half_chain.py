@@ -17,7 +17,8 @@ import numpy as np
 from dnacheck.cyclization.half_chain.sampling import HalfChainOptions, half_chain_estimate
 from dnacheck.cyclization.half_chain.window import HalfChainEstimate
 from dnacheck.cyclization.laplace.isolated import laplace
-from dnacheck.equilibria.discrete.search import RingSearch, find_rings
+from dnacheck.equilibria.discrete.search import find_rings
+from dnacheck.equilibria.ring import Equilibria
 from dnacheck.model.chain import Chain, build_chain, uniform_stiffness
 from dnacheck.model.molecules import embedded, embedded_names
 from dnacheck.validate.reference.wormlike_chain import chain_rod_j
@@ -26,7 +27,7 @@ SEED = 1
 BEST = ("09T15", "08T15", "08A17")
 
 
-def timed(search: RingSearch, options: HalfChainOptions) -> tuple[HalfChainEstimate, float]:
+def timed(search: Equilibria, options: HalfChainOptions) -> tuple[HalfChainEstimate, float]:
     """One estimate and its seconds."""
     began = time.perf_counter()
     estimate = half_chain_estimate(search, options, np.random.default_rng(SEED))

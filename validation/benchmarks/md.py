@@ -22,7 +22,7 @@ from dnacheck.cyclization.ensembles.metropolis import (
     closed_ring_ensemble,
 )
 from dnacheck.equilibria.discrete.search import find_rings
-from dnacheck.equilibria.discrete.solve import DiscreteRing
+from dnacheck.equilibria.ring import Equilibrium
 from dnacheck.md.bead_chain import BeadChain, BeadEnergy, sabotaged
 from dnacheck.md.check import MdOptions, run_md_check
 from dnacheck.md.ensemble import Ensemble, EnsembleOptions, sample_ensemble
@@ -35,7 +35,7 @@ from dnacheck.model.molecules import embedded
 from dnacheck.numerics.outcome import SolveError
 
 
-def stable_rings(chain: Chain) -> list[DiscreteRing]:
+def stable_rings(chain: Chain) -> list[Equilibrium]:
     """All minima of a chain, lowest first."""
     return [ring for ring in find_rings(chain).equilibria if ring.stable]
 
@@ -76,7 +76,7 @@ def show_energies(names: Sequence[str]) -> None:
 
 
 def sampled(
-    chain: Chain, ring: DiscreteRing, options: EnsembleOptions, directory: Path | None = None
+    chain: Chain, ring: Equilibrium, options: EnsembleOptions, directory: Path | None = None
 ) -> tuple[Ensemble, EnsembleStatistics, float]:
     """Dynamics about a ring, its statistics, and the processor time it took."""
     began = time.process_time()
@@ -89,7 +89,7 @@ def sampled(
 
 
 def monte_carlo(
-    chain: Chain, ring: DiscreteRing, samples: int
+    chain: Chain, ring: Equilibrium, samples: int
 ) -> tuple[ClosedRingEnsemble, np.ndarray, float]:
     """Metropolis ensemble, its centres (copies, samples, N, 3) in Å, and processor time."""
     began = time.process_time()

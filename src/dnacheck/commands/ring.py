@@ -22,12 +22,11 @@ from dnacheck.commands.common import (
 from dnacheck.commands.output import note, print_json, progress
 
 if TYPE_CHECKING:
-    from dnacheck.equilibria.continuum import ContinuumRing
-    from dnacheck.equilibria.discrete.solve import DiscreteRing
+    from dnacheck.equilibria.ring import Equilibrium
     from dnacheck.model.chain import Chain
     from dnacheck.model.molecules import Molecule
 
-    Found = tuple[Chain, ContinuumRing | None, DiscreteRing | None]
+    Found = tuple[Chain, Equilibrium | None, Equilibrium | None]
 
 EXIT_BAD_INPUT = 2
 EXIT_NOT_CONVERGED = 3
@@ -133,11 +132,11 @@ def _solve(
         converged = converged and discrete is not None
     comparison = None
     if smooth is not None and discrete is not None:
-        from dnacheck.equilibria.bridge.reconstruct import reconstruct, rms_difference
+        from dnacheck.equilibria.bridge.reconstruct import rms_difference
 
         comparison = {
             "energy_difference_percent": 100.0 * (smooth.energy / discrete.energy - 1.0),
-            "rms_A": rms_difference(reconstruct(smooth).centres, discrete.centres, chain.rise_A),
+            "rms_A": rms_difference(smooth.centres, discrete.centres, chain.rise_A),
         }
     record = {
         "target": molecule.name,
@@ -174,7 +173,7 @@ def _discrete_only(ring: RingSettings, warnings: list[str]) -> RingSettings:
 
 def _discrete(
     chain: Chain, ring: RingSettings, warnings: list[str]
-) -> tuple[DiscreteRing | None, list[dict[str, Any]]]:
+) -> tuple[Equilibrium | None, list[dict[str, Any]]]:
     from dnacheck.equilibria.boundary import ENDS
     from dnacheck.equilibria.discrete.boundary_search import find_equilibria
     from dnacheck.equilibria.discrete.search import SearchOptions
@@ -190,24 +189,7 @@ def _discrete(
         if not found.notes:
             warnings.append(f"discrete: {found.reason}")
         return None, []
-    entries: list[dict[str, Any]] = [
-        {
-            "model": "discrete",
-            "energy_RT": item.energy_RT,
-            "energy_reduced": item.energy,
-            "bend_RT": item.bend_RT,
-            "twist_RT": item.twist_RT,
-            "link": item.ring_link,
-            "writhe": item.writhe,
-            "stable": item.stable,
-            "smallest_eigenvalue": item.smallest_eigenvalue,
-            "residual": item.residual,
-            "iterations": item.iterations,
-            "seconds": item.seconds,
-            "status": item.status.value,
-        }
-        for item in found.equilibria
-    ]
+    entries = [item.to_dict() for item in found]
     lowest = found.lowest
     close = [e for e in entries[1:] if e["energy_RT"] - lowest.energy_RT < _CLOSE_RT]
     if close:
@@ -217,7 +199,7 @@ def _discrete(
             + (f" (link {links})" if links else "")
             + "; all of them count for J"
         )
-    if lowest.smallest_eigenvalue * chain.energy_scale_RT < _SOFT_RT:
+    if lowest.softest * chain.energy_scale_RT < _SOFT_RT:
         warnings.append(
             "discrete: the softest motion of the ring, its register, costs almost no energy; use "
             "dnacheck jfactor, which integrates over it"
@@ -227,7 +209,7 @@ def _discrete(
 
 def _continuum(
     chain: Chain, ring: RingSettings, continuum: ContinuumSettings, warnings: list[str]
-) -> tuple[ContinuumRing | None, list[dict[str, Any]]]:
+) -> tuple[Equilibrium | None, list[dict[str, Any]]]:
     from dnacheck.equilibria.continuum import lowest_continuum_ring
     from dnacheck.model.rod import RodOptions, build_rod
 
@@ -241,25 +223,7 @@ def _continuum(
     )
     warnings += [f"continuum: {text}" for text in rod.warnings]
     found = lowest_continuum_ring(rod, ring.link)
-    scale = rod.energy_scale_RT
-    entries = [
-        {
-            "model": "continuum",
-            "energy_RT": item.energy_RT,
-            "energy_reduced": item.energy,
-            "bend_RT": scale * item.bend,
-            "twist_RT": scale * item.twist,
-            "link": item.link,
-            "writhe": item.writhe,
-            "stable": item.stable,
-            "smallest_eigenvalue": None,
-            "residual": item.residual,
-            "iterations": item.iterations,
-            "seconds": item.seconds,
-            "status": item.status.value,
-        }
-        for item in found.equilibria
-    ]
+    entries = [item.to_dict() for item in found]
     if not found.minima:
         warnings.append(f"continuum: {found.reason}")
         return None, entries
@@ -267,21 +231,14 @@ def _continuum(
 
 
 def _write(
-    path: Path, chain: Chain, smooth: ContinuumRing | None, discrete: DiscreteRing | None
+    path: Path, chain: Chain, smooth: Equilibrium | None, discrete: Equilibrium | None
 ) -> None:
-    from dnacheck.io.structure import write_ring_structure
     from dnacheck.numerics.outcome import SolveError
 
-    if discrete is not None:
-        centres, frames = discrete.centres, discrete.frames
-    elif smooth is not None:
-        from dnacheck.equilibria.bridge.reconstruct import reconstruct
-
-        rebuilt = reconstruct(smooth)
-        centres, frames = rebuilt.centres, rebuilt.frames
-    else:
+    lowest = smooth if discrete is None else discrete
+    if lowest is None:
         raise SolveError(f"{chain.name}: no ring converged, so '{path}' was not written")
-    write_ring_structure(path, centres, frames, chain.letters, chain.rise_A, chain.name)
+    lowest.write(path)
 
 
 def _print(record: dict[str, Any]) -> None:

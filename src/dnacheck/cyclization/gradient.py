@@ -247,7 +247,7 @@ def log_j_gradient(
 
     Parameters
     ----------
-    target : Chain, RingSearch or RegisterProfile
+    target : Chain, Equilibria or RegisterProfile
     method : ClosureSampling, optional
 
     Raises
@@ -275,7 +275,7 @@ def closed_draws(
 
     Parameters
     ----------
-    target : Chain, RingSearch or RegisterProfile
+    target : Chain, Equilibria or RegisterProfile
     method : ClosureSampling, optional
     rng : int, SeedSequence or Generator
         The same number gives the same draws as :meth:`ClosureSampling.compute`.

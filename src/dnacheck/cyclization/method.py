@@ -13,11 +13,11 @@ from dnacheck.numerics.outcome import InputError
 if TYPE_CHECKING:
     from dnacheck.cyclization.laplace.register import RegisterProfile
     from dnacheck.cyclization.result import JFactor
-    from dnacheck.equilibria.discrete.search import RingSearch
+    from dnacheck.equilibria.ring import Equilibria
     from dnacheck.model.chain import Chain
     from dnacheck.numerics.seeds import Randomness
 
-    Target = Chain | RingSearch | RegisterProfile
+    Target = Chain | Equilibria | RegisterProfile
 
 Progress = Callable[[int], None]
 DEFAULT_TOLERANCE = 0.02
@@ -95,7 +95,7 @@ class Method(ABC):
 
         Parameters
         ----------
-        target : Chain, RingSearch or RegisterProfile
+        target : Chain, Equilibria or RegisterProfile
         rng : int, numpy.random.SeedSequence or numpy.random.Generator
             The same number or fresh sequence gives the same result, whatever ``threads`` is.
         threads : int
@@ -129,14 +129,15 @@ class Method(ABC):
         """Compute J; see :meth:`compute`, which is what to call."""
 
 
-def rings_of(target: Target) -> RingSearch:
+def rings_of(target: Target) -> Equilibria:
     """The minima of a target, searched for where they are not given."""
     from dnacheck.cyclization.laplace.register import RegisterProfile
-    from dnacheck.equilibria.discrete.search import RingSearch, find_rings
+    from dnacheck.equilibria.discrete.search import find_rings
+    from dnacheck.equilibria.ring import Equilibria
 
     if isinstance(target, RegisterProfile):
         return target.search
-    return target if isinstance(target, RingSearch) else find_rings(target)
+    return target if isinstance(target, Equilibria) else find_rings(target)
 
 
 def register_profile_of(target: Target) -> RegisterProfile:

@@ -1,21 +1,23 @@
-"""The one result of every search for a closed ring, discrete or continuum, and their collection.
+"""The one result of every search for an equilibrium, discrete or continuum, and their collection.
 
 Units
 -----
-Names that end in ``_RT``, ``_A``, ``_deg``, ``_pN`` and ``_pN_nm`` carry their unit. ``_reduced``
-is in the package's own units: energies over the bending stiffness K_theta of a step, lengths in
-steps, angles in radians. Newtons need a temperature, :data:`dnacheck.model.units.TEMPERATURE_K`.
+Names that end in ``_RT``, ``_A``, ``_deg``, ``_pN`` and ``_pN_nm`` carry their unit. ``energy``,
+``parts``, ``centres``, ``angles`` and ``multipliers`` are in the package's own units: energies over
+the bending stiffness K_theta of a step, lengths in steps, angles in radians. Newtons need a
+temperature, :data:`dnacheck.model.units.TEMPERATURE_K`.
 
 Axes
 ----
-Coordinates, frames, force and moment are all components in the frame of the first base pair, which
-lies at the origin. Force and moment are those that the rest of the molecule exerts on the end that
-is joined to the first base pair, the moment about its centre.
+Coordinates, frames, force and moment are components in the frame of the first base pair, which
+lies at the origin. Force and moment are those that are exerted on the end (in a ring: by the first
+base pair on the last step), the moment about the end's centre.
 """
 
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,7 +28,8 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from dnacheck.model.chain import Chain, chain_frames, energy_parts
+from dnacheck.equilibria.boundary import AnyBoundary, Ring
+from dnacheck.model.chain import Chain, angles_of_frames, chain_frames, energy_parts
 from dnacheck.model.rod.rod import Rod
 from dnacheck.model.units import TEMPERATURE_K, thermal_energy_pN_nm
 from dnacheck.numerics.outcome import InputError, SolveError, Status
@@ -39,6 +42,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Model = Literal["discrete", "continuum"]
+
+RING = Ring()
 
 COLUMNS = (
     "model",
@@ -57,30 +62,60 @@ COLUMNS = (
 )
 """Members of an equilibrium's JSON and columns of its table, in their order."""
 
+_SOLVED = (Status.CONVERGED, Status.SADDLE, Status.NEUTRAL, Status.MESH_LIMIT)
 _STABLE = {True: "stable", False: "saddle", None: "stability unknown"}
+
+
+@dataclass(frozen=True)
+class Steps:
+    """What solves a discrete chain.
+
+    Attributes
+    ----------
+    angles : ndarray, shape (N, c)
+        Coordinates of each step: tau, theta, phi in radians, or the six of a rigid step; read-only.
+    multipliers : ndarray, shape (6,)
+        Force (reduced energy per step length) and moment (reduced energy per radian) of closure,
+        in the frame of the target (the first base pair's for a ring): gradient + (closure
+        Jacobian)^T multipliers = 0. Minus the loads on components that are free.
+    log_abs_det_kkt : float
+        log |det| of the matrix [[H, G^T], [G, 0]], for the Laplace J factor; of no use where an
+        eigenvalue is zero.
+    closure : float
+        Largest entry of the closure equations (steps, radians).
+    """
+
+    angles: Array
+    multipliers: Array
+    log_abs_det_kkt: float
+    closure: float
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Equilibrium:
-    """A closed equilibrium of an elastic molecule, or the point where its search ended.
+    """An equilibrium of an elastic molecule, or the point where its search ended.
 
     Attributes
     ----------
     source : Chain or Rod
-        What was closed: the discrete chain or the continuum rod.
-    energy_reduced : float
-        Elastic energy, in units of a step's bending stiffness.
-    link : int
-        Turns of the frames about the ring: twist plus writhe.
-    writhe : float
-        Turns.
+        What is in equilibrium: the discrete chain or the continuum rod.
+    solution : Steps or Curve
+        What solves its equations.
+    energy : float
+        Elastic energy, in units of a step's bending stiffness; ``energy_RT`` in RT.
+    ring_link : int or None
+        Turns of the frames about a ring: twist plus writhe. None unless the boundary is a ring.
+    twist_turns, writhe : float
+        In turns. Without a link the twist ends at the nick, and the writhe is not a number where
+        the ends do not meet.
     stable : bool or None
-        Whether every small closed deformation raises the energy; None where that could not be
-        told: the search did not converge, or an eigenvalue is zero to round-off (``status`` says).
+        Whether every small deformation that the boundary allows raises the energy; None where that
+        could not be told: the search did not converge, or an eigenvalue is zero to round-off
+        (``status`` tells which).
     negative_directions : int or None
-        Independent closed deformations that lower the energy, round-off apart.
+        Independent deformations that lower the energy, round-off apart; of a rod, conjugate points.
     residual : float
-        Largest residual of all equations, of the discrete gradient and closure (reduced units) or
+        Largest residual of all equations: of the discrete gradient and closure (reduced units), or
         of collocation (relative) and closure.
     iterations : int
         Newton iterations.
@@ -88,23 +123,14 @@ class Equilibrium:
         Wall time.
     status : Status
         How the search ended; ``status.value`` is what to know or do next.
-    solved_angles : ndarray, shape (N, 3) or (N, 6), or None
-        Discrete ring: the unknowns of each step (tau, theta, phi in radians). None: continuum.
-    multipliers : ndarray, shape (6,), or None
-        Discrete ring: force (reduced energy per step length) and moment (reduced energy per
-        radian) of closure: gradient + (closure Jacobian)^T multipliers = 0.
-    log_abs_det_kkt : float
-        Discrete ring: log |det| of [[H, G^T], [G, 0]] for Laplace's J; of no use where an
-        eigenvalue is zero.
-    closure : float
-        Discrete ring: largest closure residual (steps, radians).
-    curve : Curve or None
-        Continuum ring: the solution as functions of arclength, with its loads and errors.
+    boundary : Ring, NickedRing, HingedRing, Loop or Pull
     """
 
     source: Chain | Rod
-    energy_reduced: float
-    link: int
+    solution: Steps | Curve
+    energy: float
+    ring_link: int | None
+    twist_turns: float
     writhe: float
     stable: bool | None
     negative_directions: int | None
@@ -112,30 +138,62 @@ class Equilibrium:
     iterations: int
     seconds: float
     status: Status
-    solved_angles: Array | None = None
-    multipliers: Array | None = None
-    log_abs_det_kkt: float = float("nan")
-    closure: float = float("nan")
-    curve: Curve | None = None
+    boundary: AnyBoundary = RING
 
     @property
     def model(self) -> Model:
         """Which model this is an equilibrium of."""
-        return "discrete" if self.curve is None else "continuum"
+        return "discrete" if isinstance(self.solution, Steps) else "continuum"
 
     @property
     def chain(self) -> Chain:
-        """The chain of a discrete ring."""
-        if not isinstance(self.source, Chain):
-            raise InputError(f"the ring of {self.name} is continuum; give a discrete one")
-        return self.source
+        """The chain of a discrete equilibrium.
+
+        Raises
+        ------
+        InputError
+            It is a rod's.
+        """
+        return _chain(self.source)
 
     @property
     def rod(self) -> Rod:
-        """The rod of a continuum ring."""
-        if not isinstance(self.source, Rod):
-            raise InputError(f"the ring of {self.name} is discrete; give a continuum one")
-        return self.source
+        """The rod of a continuum equilibrium.
+
+        Raises
+        ------
+        InputError
+            It is a chain's.
+        """
+        if isinstance(self.source, Rod):
+            return self.source
+        raise InputError(f"{self.name}: this is a discrete chain's; give a rod's")
+
+    @property
+    def steps(self) -> Steps:
+        """Solution of a discrete chain.
+
+        Raises
+        ------
+        InputError
+            It is a rod's.
+        """
+        if isinstance(self.solution, Steps):
+            return self.solution
+        raise InputError(f"{self.name}: this is a continuum rod's; give a discrete chain's")
+
+    @property
+    def curve(self) -> Curve:
+        """Solution of a continuum rod.
+
+        Raises
+        ------
+        InputError
+            It is a chain's.
+        """
+        if isinstance(self.solution, Steps):
+            raise InputError(f"{self.name}: this is a discrete chain's; give a continuum rod's")
+        return self.solution
 
     @property
     def name(self) -> str:
@@ -144,130 +202,169 @@ class Equilibrium:
 
     @property
     def n_bp(self) -> int:
-        """Number of base pairs N, which is the number of steps of the ring."""
+        """Number of base pairs N, which is the number of steps."""
         return self.source.n_steps
+
+    @property
+    def link(self) -> int:
+        """Turns of the frames about the ring.
+
+        Raises
+        ------
+        InputError
+            The ends are not those of a ring.
+        """
+        if self.ring_link is None:
+            raise InputError(f"a {self.boundary.label} chain has no link; ask a ring for it")
+        return self.ring_link
+
+    @property
+    def energy_reduced(self) -> float:
+        """``energy``, by its name in tables and JSON."""
+        return self.energy
 
     @property
     def temperature_K(self) -> float:
         """Temperature at which force and moment are given; energies in RT need none."""
-        return TEMPERATURE_K
+        return getattr(self.boundary, "temperature_K", TEMPERATURE_K)
 
     @property
     def energy_RT(self) -> float:
         """Elastic energy in RT."""
-        return self.energy_reduced * self.source.energy_scale_RT
+        return self.energy * self.source.energy_scale_RT
 
     @cached_property
-    def parts_reduced(self) -> tuple[float, float]:
+    def parts(self) -> tuple[float, float]:
         """Bending and twisting parts of the reduced energy; their sum is the energy."""
-        if self.curve is not None:
-            return self.curve.bend, self.curve.twist
-        assert self.solved_angles is not None
-        return energy_parts(self.chain, self.solved_angles)
+        if isinstance(self.solution, Steps):
+            return energy_parts(self.chain, self.solution.angles)
+        return self.solution.bend, self.solution.twist
 
     @property
     def bend_RT(self) -> float:
         """Bending part of the energy in RT; couplings to the twist, if any, included."""
-        return self.parts_reduced[0] * self.source.energy_scale_RT
+        return self.parts[0] * self.source.energy_scale_RT
 
     @property
     def twist_RT(self) -> float:
         """Twisting part of the energy in RT."""
-        return self.parts_reduced[1] * self.source.energy_scale_RT
+        return self.parts[1] * self.source.energy_scale_RT
 
     @property
-    def twist_turns(self) -> float:
-        """Twist in turns: link minus writhe."""
-        return self.link - self.writhe
+    def multipliers(self) -> Array:
+        """Of a discrete chain, see :class:`Steps`."""
+        return self.steps.multipliers
+
+    @property
+    def log_abs_det_kkt(self) -> float:
+        """Of a discrete chain, see :class:`Steps`."""
+        return self.steps.log_abs_det_kkt
+
+    @property
+    def closure(self) -> float:
+        """Of a discrete chain, see :class:`Steps`."""
+        return self.steps.closure
 
     @cached_property
-    def smallest_eigenvalue(self) -> float | None:
-        """Smallest eigenvalue of the projected Hessian, reduced energy per square radian.
+    def softest(self) -> float:
+        """Smallest eigenvalue of a chain's projected Hessian, reduced energy per square radian.
 
-        None for a continuum ring, whose stability is told by its conjugate points.
+        Raises
+        ------
+        InputError
+            It is a rod's, whose stability is told by its conjugate points.
         """
-        if self.solved_angles is None:
-            return None
         from dnacheck.equilibria.discrete.spectrum import smallest_projected_eigenvalue
 
-        return smallest_projected_eigenvalue(self.chain, self.solved_angles, self.multipliers)
+        chain, solution = self.chain, self.steps
+        return smallest_projected_eigenvalue(
+            chain, solution.angles, solution.multipliers, self.boundary.for_chain(chain)
+        )
+
+    @property
+    def smallest_eigenvalue(self) -> float | None:
+        """The same; None for a rod."""
+        return self.softest if isinstance(self.solution, Steps) else None
 
     @cached_property
     def shape(self) -> tuple[Array, Array]:
-        """Centres (N+1, 3) in steps and frames (N+1, 3, 3), directors in columns.
+        """Centres (N+1, 3) in steps and frames (N+1, 3, 3), frame 0 at the origin.
 
-        The last is the copy of the first that closes the ring. A discrete ring has frame 0 at the
-        origin; a continuum ring, sampled at its base pairs (Section IX), has the axes of its rod.
+        Directors in the columns. Entry N is the end's, which lies on the first in a ring. A rod is
+        sampled at its base pairs (Section IX).
         """
-        if self.curve is not None:
-            from dnacheck.equilibria.bridge.reconstruct import reconstruct
+        if isinstance(self.solution, Steps):
+            return chain_frames(self.solution.angles, self.chain.step_form)
+        from dnacheck.equilibria.bridge.reconstruct import reconstruct
 
-            rebuilt = reconstruct(self)
-            return rebuilt.centres, rebuilt.frames
-        assert self.solved_angles is not None
-        return chain_frames(self.solved_angles, self.chain.step_form)
+        pairs = reconstruct(self)
+        first = pairs.frames[0]
+        centres = (pairs.centres - pairs.centres[0]) @ first
+        return _frozen(centres), _frozen(np.einsum("ab,iac->ibc", first, pairs.frames))
 
-    @cached_property
-    def angles(self) -> Array:
-        """tau, theta, phi of each step in radians, shape (N, 3)."""
-        if self.solved_angles is not None:
-            return self.solved_angles
-        from dnacheck.model.chain import angles_of_frames
+    @property
+    def centres(self) -> Array:
+        """Base-pair centres (N+1, 3) in steps."""
+        return self.shape[0]
 
-        return _frozen(angles_of_frames(self.shape[1]))
+    @property
+    def frames(self) -> Array:
+        """Base-pair frames, shape (N+1, 3, 3): entry [i, :, k] is director d_(k+1) of pair i.
 
-    @cached_property
-    def angles_deg(self) -> Array:
-        """Angles of each step in degrees, shape (N, 3): tau (twist), theta (roll), phi (tilt).
-
-        Step i leads from base pair i to i + 1, the last one back to the first. Steps of six
-        parameters have shape (N, 6): tilt, roll, twist in degrees, shift, slide, rise in Å.
+        Components along the directors of the first base pair. Entry N is the end's frame, in a
+        ring the first's.
         """
-        if self.angles.shape[1] == 6:
-            return _frozen(np.hstack([np.degrees(self.angles[:, :3]), self.angles[:, 3:]]))
-        return _frozen(np.degrees(self.angles))
+        return self.shape[1]
 
     @cached_property
     def coordinates_A(self) -> Array:
-        """Base-pair centres in Å, shape (N, 3); the first is the origin."""
-        centres, frames = self.shape
-        moved = (centres[:-1] - centres[0]) @ frames[0]
-        return _frozen(self.source.rise_A * moved)
+        """Base-pair centres in Å, shape (N+1, 3); the first is the origin, entry N the end."""
+        return _frozen(self.source.rise_A * self.centres)
 
     @cached_property
-    def frames(self) -> Array:
-        """Base-pair frames, shape (N, 3, 3): entry [i, :, k] is director d_(k+1) of pair i.
+    def angles(self) -> Array:
+        """Coordinates of each step, shape (N, c): tau, theta, phi in radians, or six (rigid)."""
+        if isinstance(self.solution, Steps):
+            return self.solution.angles
+        return _frozen(angles_of_frames(self.frames))
 
-        Components along the directors of the first base pair, whose frame is the unit matrix.
+    @cached_property
+    def angles_deg(self) -> Array:
+        """Angles of each step in degrees, shape (N, 3): tau (twist), theta and phi (the bends).
+
+        Step i leads from base pair i to i + 1. Rigid steps have shape (N, 6): twist, tilt and roll
+        in degrees, shift, slide and rise in Å.
         """
-        _, frames = self.shape
-        return _frozen(np.einsum("ab,iac->ibc", frames[0], frames[:-1]))
+        degrees = np.degrees(self.angles[:, :3])
+        return _frozen(np.hstack([degrees, self.source.rise_A * self.angles[:, 3:]]))
 
     @cached_property
-    def _loads_reduced(self) -> tuple[Array, Array]:
-        """Force (reduced energy per step) and moment about base pair 0, in its frame."""
-        if self.curve is None:
-            assert self.multipliers is not None
-            return -self.multipliers[:3], -self.multipliers[3:]
-        centres, frames = self.shape
-        force = self.curve.loads[3:] / self.n_bp
-        moment = self.curve.loads[:3] - np.cross(centres[0], force)
-        return force @ frames[0], moment @ frames[0]
+    def _loads(self) -> tuple[Array, Array]:
+        """Force (reduced energy per step) and moment on the end, in the first frame."""
+        if isinstance(self.solution, Steps):
+            target = np.array(getattr(self.boundary, "rotation", np.eye(3)))
+            return -target @ self.multipliers[:3], -target @ self.multipliers[3:]
+        from dnacheck.equilibria.bridge.reconstruct import reconstruct
+
+        pairs = reconstruct(self)
+        force = self.solution.loads[3:] / self.n_bp
+        moment = self.solution.loads[:3] - np.cross(pairs.centres[0], force)
+        return force @ pairs.frames[0], moment @ pairs.frames[0]
 
     @cached_property
     def force_pN(self) -> Array:
-        """Force that the rest of the ring exerts on the end at the first base pair, shape (3,).
+        """Force on the end, shape (3,), in pN at ``temperature_K``; see the module's axes.
 
-        In pN, at ``temperature_K``, along the directors of the first base pair.
+        In a ring the first base pair exerts it on the last step.
         """
         scale = self.source.energy_scale_RT * thermal_energy_pN_nm(self.temperature_K)
-        return _frozen(self._loads_reduced[0] * scale * 10.0 / self.source.rise_A)
+        return _frozen(self._loads[0] * scale * 10.0 / self.source.rise_A)
 
     @cached_property
     def moment_pN_nm(self) -> Array:
-        """Moment about the first base pair's centre, shape (3,), in pN nm; see ``force_pN``."""
+        """Moment on the end about its centre, shape (3,), in pN nm; see ``force_pN``."""
         scale = self.source.energy_scale_RT * thermal_energy_pN_nm(self.temperature_K)
-        return _frozen(self._loads_reduced[1] * scale)
+        return _frozen(self._loads[1] * scale)
 
     def to_dict(self) -> dict[str, Any]:
         """What the commands print as JSON.
@@ -278,8 +375,9 @@ class Equilibrium:
             model, energy_RT, energy_reduced, bend_RT, twist_RT (RT), link, writhe (turns), stable,
             smallest_eigenvalue, residual, iterations, seconds, status; plain Python values.
         """
-        values = {column: getattr(self, column) for column in COLUMNS}
-        return values | {"status": self.status.value}
+        values = {column: getattr(self, column) for column in COLUMNS if column != "link"}
+        values |= {"link": self.ring_link, "status": self.status.value}
+        return {column: values[column] for column in COLUMNS}
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the ring as a structure file, three atoms per base pair.
@@ -287,7 +385,7 @@ class Equilibrium:
         Parameters
         ----------
         path : path
-            Ends in .pdb or .gro; its folder must exist.
+            Ends in .pdb, .gro or .cif, or one of these and .gz; its folder must exist.
 
         Raises
         ------
@@ -296,14 +394,13 @@ class Equilibrium:
         """
         from dnacheck.io.structure import write_ring_structure
 
-        where = Path(path)
-        if not where.parent.is_dir():
-            raise InputError(
-                f"path '{where}': there is no folder '{where.parent}'; make it or name another"
-            )
-        centres, frames = self.shape
         write_ring_structure(
-            where, centres, frames, self.source.letters, self.source.rise_A, self.name
+            Path(path),
+            self.centres,
+            self.frames,
+            self.source.letters,
+            self.source.rise_A,
+            self.name,
         )
 
     def plot(self, ax: Axes | None = None) -> Axes:
@@ -324,15 +421,16 @@ class Equilibrium:
         return draw_ring(self, ax)
 
     def __repr__(self) -> str:
+        link = "" if self.ring_link is None else f", link {self.ring_link}"
         return (
-            f"<{self.model} ring of {self.name}, {self.n_bp} bp: {self.energy_RT:.4f} RT "
-            f"(bend {self.bend_RT:.4f}, twist {self.twist_RT:.4f}), link {self.link}, "
+            f"<{self.model} {self.boundary.label} of {self.name}, {self.n_bp} bp: "
+            f"{self.energy_RT:.4f} RT (bend {self.bend_RT:.4f}, twist {self.twist_RT:.4f}){link}, "
             f"writhe {self.writhe:+.4f}, {_STABLE[self.stable]}>"
         )
 
     def _repr_html_(self) -> str:
         rows = "".join(
-            f"<tr><th style='text-align:left'>{escape(key)}</th><td>{escape(_text(value))}</td></tr>"
+            f"<tr><th>{escape(key)}</th><td>{escape(_text(value))}</td></tr>"
             for key, value in self.to_dict().items()
         )
         return f"<table><caption>{escape(self.name)}, {self.n_bp} bp</caption>{rows}</table>"
@@ -345,30 +443,33 @@ class Equilibria(Sequence[Equilibrium]):
     Attributes
     ----------
     source : Chain or Rod
-        What was closed.
-    found : tuple of Equilibrium
+    equilibria : tuple of Equilibrium
+        Minima of a chain; of a rod, saddles too. Where one link was asked for, of that link only.
     links_searched : tuple of int
         Links of the starting shapes. A start may relax to another link of the same parity,
         because chains may pass through themselves.
-    starts : int
-        Starting shapes tried.
-    failures : tuple of Equilibrium
-        Starts that did not converge, where they were kept.
-    failed_starts : int
-        Starts that did not converge.
+    starts, failed_starts : int
+        Starting shapes, and those of them that did not converge.
     seconds : float
         Wall time.
     status : Status
+        NOT_FOUND also where every equilibrium is a saddle.
+    ends : tuple of Equilibrium
+        Other places where starts came to an end: other links than the one asked for, and what did
+        not converge, as far as they were kept.
+    notes : tuple of str
+        Bounds that the search met, and what became of a link that has no ring.
     """
 
     source: Chain | Rod
-    found: tuple[Equilibrium, ...]
+    equilibria: tuple[Equilibrium, ...]
     links_searched: tuple[int, ...]
     starts: int
     failed_starts: int
     seconds: float
     status: Status
-    failures: tuple[Equilibrium, ...] = ()
+    ends: tuple[Equilibrium, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -377,10 +478,14 @@ class Equilibria(Sequence[Equilibrium]):
 
     @property
     def chain(self) -> Chain:
-        """The chain of a discrete search."""
-        if not isinstance(self.source, Chain):
-            raise InputError(f"the rings of {self.name} are continuum; give discrete ones")
-        return self.source
+        """The chain of a discrete search.
+
+        Raises
+        ------
+        InputError
+            A rod was searched.
+        """
+        return _chain(self.source)
 
     @property
     def model(self) -> Model:
@@ -389,8 +494,8 @@ class Equilibria(Sequence[Equilibrium]):
 
     @property
     def minima(self) -> tuple[Equilibrium, ...]:
-        """Those that are not saddles."""
-        return tuple(ring for ring in self.found if ring.stable is not False)
+        """Those that are not saddles, lowest first."""
+        return tuple(ring for ring in self.equilibria if ring.stable is not False)
 
     @property
     def lowest(self) -> Equilibrium:
@@ -401,32 +506,50 @@ class Equilibria(Sequence[Equilibrium]):
         SolveError
             None was found; its ``partial`` is this search.
         """
-        for ring in self.found:
+        for ring in self.equilibria:
             if ring.stable is not False:
                 return ring
-        what = (
-            f"only {len(self.found)} saddles were found"
-            if self.found
-            else f"none of {self.starts} starts converged"
-        )
-        raise SolveError(
-            f"{self.model} ring of {self.name}: {what} over links "
-            f"{', '.join(map(str, self.links_searched))}; {Status.NOT_FOUND.value}",
-            self,
-        )
+        raise SolveError(f"{self.model} ring of {self.name}: {self.reason}", self)
+
+    @property
+    def reason(self) -> str:
+        """Why there is no minimum, in one line."""
+        if self.notes:
+            return "; ".join(self.notes)
+        links = ", ".join(map(str, self.links_searched))
+        where = f" at link{'s' if len(self.links_searched) > 1 else ''} {links}" if links else ""
+        if self.model == "discrete":
+            return (
+                f"no stable ring{where}: {self.failed_starts} of {self.starts} starts did not "
+                "converge to one; search links all, or others"
+            )
+        counts: Counter[str] = Counter()
+        unfinished = [ring for ring in self.ends if ring.status not in _SOLVED]
+        for ring in (*self.equilibria, *self.ends):
+            if ring.status in _SOLVED:
+                kind = "saddle" if ring.stable is False else "ring"
+                counts[f"{kind} of link {ring.link} ({ring.energy_RT:.4f} RT)"] += 1
+        if unfinished:
+            nearest = min(ring.residual for ring in unfinished)
+            text = f"start{'s' if len(unfinished) > 1 else ''} without convergence"
+            counts[f"{text} (residual {nearest:.0e} at best)"] += len(unfinished)
+        reached = ", ".join(f"{count} {what}" for what, count in counts.items())
+        if self.equilibria:
+            return f"only saddles were found{where}: {reached}"
+        return f"no equilibrium was found{where}, but {reached}; search links auto or all"
 
     def __len__(self) -> int:
-        return len(self.found)
+        return len(self.equilibria)
 
     @overload
     def __getitem__(self, index: int) -> Equilibrium: ...
     @overload
     def __getitem__(self, index: slice) -> tuple[Equilibrium, ...]: ...
     def __getitem__(self, index: int | slice) -> Equilibrium | tuple[Equilibrium, ...]:
-        return self.found[index]
+        return self.equilibria[index]
 
     def __iter__(self) -> Iterator[Equilibrium]:
-        return iter(self.found)
+        return iter(self.equilibria)
 
     def to_dict(self) -> dict[str, Any]:
         """The search as plain Python values.
@@ -446,30 +569,37 @@ class Equilibria(Sequence[Equilibrium]):
             "failed_starts": self.failed_starts,
             "seconds": self.seconds,
             "status": self.status.value,
-            "equilibria": [ring.to_dict() for ring in self.found],
+            "equilibria": [ring.to_dict() for ring in self.equilibria],
         }
 
     def to_frame(self) -> pandas.DataFrame:
         """A table with a row for each equilibrium, lowest first, and the columns of the JSON."""
         import pandas
 
-        return pandas.DataFrame([ring.to_dict() for ring in self.found], columns=list(COLUMNS))
+        return pandas.DataFrame([ring.to_dict() for ring in self.equilibria], columns=list(COLUMNS))
 
     def __repr__(self) -> str:
-        head = f"<{len(self.found)} {self.model} rings of {self.name}, {self.source.n_steps} bp"
-        return "\n  ".join([head, *map(repr, self.found)]) + ">"
+        count = len(self.equilibria)
+        head = f"<{count} {self.model} equilibria of {self.name}, {self.source.n_steps} bp"
+        return "\n  ".join([head, *map(repr, self.equilibria)]) + ">"
 
     def _repr_html_(self) -> str:
         head = "".join(f"<th>{escape(column)}</th>" for column in COLUMNS)
         rows = "".join(
             "<tr>" + "".join(f"<td>{escape(_text(v))}</td>" for v in ring.to_dict().values())
             + "</tr>"
-            for ring in self.found
+            for ring in self.equilibria
         )  # fmt: skip
         return (
             f"<table><caption>{escape(self.name)}, {self.source.n_steps} bp</caption>"
             f"<tr>{head}</tr>{rows}</table>"
         )
+
+
+def _chain(source: Chain | Rod) -> Chain:
+    if isinstance(source, Chain):
+        return source
+    raise InputError(f"{source.name}: this is a continuum rod; give a discrete chain")
 
 
 def _text(value: object) -> str:

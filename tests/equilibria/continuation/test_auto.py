@@ -19,11 +19,12 @@ from dnacheck.equilibria.continuum.state import new_state, run_newton, transfer
 def start_on_uniform_mesh(rod):
     """Walker and spot of the lowest ring on 50 equal intervals with 4 points each."""
     ring = lowest_continuum_ring(rod).lowest
-    state = new_state(discretise(rod, ring.mesh, ring.degree))
-    state.slopes[:], state.loads[:], state.centres[:] = ring.slopes, ring.loads, ring.centres
+    state = new_state(discretise(rod, ring.curve.mesh, ring.curve.degree))
+    curve = ring.curve
+    state.slopes[:], state.loads[:], state.centres[:] = curve.slopes, curve.loads, curve.centres
     moved = transfer(state, np.linspace(0.0, 1.0, 51))
-    assert run_newton(moved, moved.disc.coefficients(), ring.alpha, ContinuumOptions())
-    return start_walker(moved.disc, end_twist(), ContinuationOptions(), ring.alpha, moved)
+    assert run_newton(moved, moved.disc.coefficients(), ring.curve.alpha, ContinuumOptions())
+    return start_walker(moved.disc, end_twist(), ContinuationOptions(), ring.curve.alpha, moved)
 
 
 @pytest.mark.oracle
@@ -33,12 +34,15 @@ def test_energies_along_the_branch():
     rod = molecule_rod("11T15")
     walker, spot = start_on_uniform_mesh(rod)
     ring = ring_from(walker.disc, walker.active, spot.parameter, spot.loads, spot.slopes)
-    solution = ring.solution(np.linspace(0.0, 1.0, 201))
+    solution = ring.curve.solution(np.linspace(0.0, 1.0, 201))
     found = auto07p.follow_twist(rod, spot.parameter, solution, points=60, energy=True)
     folded = int(np.argmax(np.diff(found.alpha) < 0.0)) or len(found.alpha)
     compared = 0
     for alpha, energy, moment in zip(
-        found.alpha[1:folded], found.energy[1:folded], found.end_moment[1:folded], strict=True
+        found.alpha[1:folded],
+        found.energy[1:folded],
+        found.end_moment[1:folded],
+        strict=True,
     ):
         branch = follow_branch(walker, spot, Bounds(-10.0, alpha), both=False)
         assert branch.parameter[-1] == pytest.approx(alpha, abs=1e-12)

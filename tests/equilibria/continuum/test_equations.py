@@ -150,16 +150,16 @@ def test_published_variables_solve_the_papers_problem():
     """(r, q, n, mu) of a computed ring satisfies (4.9) and (4.11)."""
     rod = molecule_rod("09T15")
     ring = solve_continuum_ring(rod, 15, options=ContinuumOptions(intervals=160, degree=6))
-    ends = ring.solution([0.0, 1.0])
-    assert np.max(np.abs(end_conditions(ends[0], ends[1], ring.alpha))) < 1e-9
+    ends = ring.curve.solution([0.0, 1.0])
+    assert np.max(np.abs(end_conditions(ends[0], ends[1], ring.curve.alpha))) < 1e-9
     # compare with central differences inside a piece, where the strains are smooth
     middle = 0.5 * (rod.breaks[1:] + rod.breaks[:-1])
     h = 1e-3 * np.min(np.diff(rod.breaks)[1:-1])
-    slope = (ring.solution(middle + h) - ring.solution(middle - h)) / (2 * h)
+    slope = (ring.curve.solution(middle + h) - ring.curve.solution(middle - h)) / (2 * h)
     strains = np.column_stack([rod.strains(middle), np.zeros(middle.size)])
     stiffness = np.array([rod.bend_stiffness, rod.bend_stiffness, rod.twist_stiffness])
-    expected = rates(ring.solution(middle), strains, stiffness)
+    expected = rates(ring.curve.solution(middle), strains, stiffness)
     assert np.max(np.abs(slope - expected)) < 1e-5
     # a rod with other strains is not solved by it
-    wrong = rates(ring.solution(middle), 1.01 * strains, stiffness)
+    wrong = rates(ring.curve.solution(middle), 1.01 * strains, stiffness)
     assert np.max(np.abs(slope - wrong)) > 1e-3

@@ -22,7 +22,7 @@ def test_equilibria_are_sorted_distinct_and_stable_first():
 
 def test_one_link_only():
     search = lowest_continuum_ring(molecule_rod("09T09"), links=15)
-    assert search.links == (15,)
+    assert search.links_searched == (15,)
     assert search.lowest.link == 15
     assert search.lowest.energy > lowest_continuum_ring(molecule_rod("09T09")).lowest.energy
 
@@ -30,7 +30,7 @@ def test_one_link_only():
 def test_links_at_half_a_turn_are_both_searched():
     rod = build_rod(straight_chain(150, 2 * np.pi * 14.5 / 150))
     search = lowest_continuum_ring(rod)
-    assert {14, 15} <= set(search.links)
+    assert {14, 15} <= set(search.links_searched)
     a, b = (ring for ring in search.equilibria if ring.link in (14, 15))
     assert a.energy == pytest.approx(b.energy, rel=1e-9)
 

@@ -159,7 +159,7 @@ def test_saddle_has_the_inertia_of_dense_algebra():
     inverse = ProjectedInverse(chain, saddle.angles, saddle.multipliers)
     columns = [basis.T @ inverse(c.reshape(-1, 3)).ravel() for c in basis.T]
     values = np.linalg.eigvalsh(np.array(columns))
-    assert int(np.sum(values < 0.0)) == saddle.negative_eigenvalues
+    assert int(np.sum(values < 0.0)) == saddle.negative_directions
 
 
 def test_an_independent_optimiser_ends_at_the_same_ring():

@@ -29,7 +29,7 @@ from dnacheck.cyclization.closure.kernels.draws import (
 from dnacheck.cyclization.laplace.constrained_minimum import steps_in_RT
 from dnacheck.cyclization.laplace.register import RegisterProfile, register_profile
 from dnacheck.cyclization.result import JFactor, JStatus, link_shares
-from dnacheck.equilibria.discrete.search import RingSearch
+from dnacheck.equilibria.ring import Equilibria
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import InputError, SolveError
 from dnacheck.numerics.seeds import Randomness, seed_sequence
@@ -350,7 +350,7 @@ def _batch_summary(draws: Draws) -> tuple[float, float]:
 
 
 def sample_closure(
-    target: Chain | RingSearch | RegisterProfile,
+    target: Chain | Equilibria | RegisterProfile,
     options: ClosureOptions | None = None,
     seed: Randomness = 0,
 ) -> JFactor:

@@ -21,7 +21,7 @@ from dnacheck.cyclization.ensembles.kernels.open_moves import (
     local_sweep,
 )
 from dnacheck.cyclization.umbrella.mbar import quiet_pymbar
-from dnacheck.equilibria.discrete.solve import DiscreteRing
+from dnacheck.equilibria.ring import Equilibrium
 from dnacheck.model.chain import Chain, chain_frames
 from dnacheck.numerics.outcome import InputError
 from dnacheck.numerics.random_numbers import random_state
@@ -162,7 +162,7 @@ class ClosedRingEnsemble:
 
     Attributes
     ----------
-    ring : DiscreteRing
+    ring : Equilibrium
         Where the copies started.
     energy_RT, writhe, twist, radius_of_gyration_A : Observable
         Elastic energy in RT; turns; turns; Å (about the centroid of the base-pair centres).
@@ -182,7 +182,7 @@ class ClosedRingEnsemble:
     seconds : float
     """
 
-    ring: DiscreteRing
+    ring: Equilibrium
     energy_RT: Observable
     writhe: Observable
     twist: Observable
@@ -231,7 +231,7 @@ def mean_structure(centres: NDArray[np.float32]) -> tuple[Array, Array, NDArray[
 
 def closed_ring_ensemble(
     chain: Chain,
-    ring: DiscreteRing,
+    ring: Equilibrium,
     options: ClosedRingOptions | None = None,
     rng: np.random.Generator | int = 0,
 ) -> ClosedRingEnsemble:
@@ -241,7 +241,7 @@ def closed_ring_ensemble(
 
     Parameters
     ----------
-    ring : DiscreteRing
+    ring : Equilibrium
         A closed equilibrium of ``chain``; the copies start there.
     rng : Generator or int
         Random numbers, or the seed for them; spawns one stream for each copy.

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from dnacheck.cyclization.half_chain.sampling import HalfChainOptions
     from dnacheck.cyclization.method import Target
     from dnacheck.cyclization.result import JFactor
-    from dnacheck.equilibria.discrete.search import RingSearch
+    from dnacheck.equilibria.ring import Equilibria
 
 _FIRST_HALVES = 4_000
 _MOST_HALVES = 256_000
@@ -76,7 +76,7 @@ class HalfChain(Method):
             run.progress(result.samples)
         return result
 
-    def _to_tolerance(self, search: RingSearch, run: Run) -> JFactor:
+    def _to_tolerance(self, search: Equilibria, run: Run) -> JFactor:
         """Halves in growing numbers until the tolerance, the time or the most halves."""
         from dnacheck.cyclization.half_chain.sampling import half_chain
         from dnacheck.cyclization.result import JStatus

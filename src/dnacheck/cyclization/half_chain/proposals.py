@@ -25,8 +25,8 @@ from dnacheck.equilibria.discrete.kernels.closure import (
     linearise,
 )
 from dnacheck.equilibria.discrete.kernels.factorisation import FACTOR_WIDTH, factorise
-from dnacheck.equilibria.discrete.search import RingSearch
 from dnacheck.equilibria.discrete.spectrum import ProjectedInverse
+from dnacheck.equilibria.ring import Equilibria
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import SolveError
 
@@ -218,7 +218,7 @@ def _walk(chain: Chain, start: Array, direction: Array, ceiling: float, known: l
         q, way = moved, new if along > 0.0 else -new
 
 
-def centre_shapes(search: RingSearch) -> list[tuple[Array, Array, int]]:
+def centre_shapes(search: Equilibria) -> list[tuple[Array, Array, int]]:
     """Angles (N, 3), reduced multipliers (6,) and link of the shapes that sampling starts from.
 
     They are the minima of the search, and the one ring of a family with a free register that it
@@ -237,7 +237,7 @@ def centre_shapes(search: RingSearch) -> list[tuple[Array, Array, int]]:
     return [shape for shape in shapes if _energy_RT(chain, shape[0])[0] < lowest + _WINDOW_RT]
 
 
-def ring_tilts(search: RingSearch, joint: int) -> tuple[Tilt, ...]:
+def ring_tilts(search: Equilibria, joint: int) -> tuple[Tilt, ...]:
     """Tilts that cover the stable minima of a search, for halves that meet at base pair ``joint``.
 
     Shares fall with half the energy, so that higher shapes are still sampled.

@@ -33,7 +33,8 @@ from dnacheck.cyclization.half_chain.kernels.pairs import fill_cells, half_poses
 from dnacheck.cyclization.half_chain.proposals import Tilt, ring_tilts
 from dnacheck.cyclization.half_chain.window import HalfChainEstimate, PairSums, window_estimate
 from dnacheck.cyclization.result import JFactor, JStatus
-from dnacheck.equilibria.discrete.search import RingSearch, find_rings
+from dnacheck.equilibria.discrete.search import find_rings
+from dnacheck.equilibria.ring import Equilibria
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import InputError, SolveError
 from dnacheck.numerics.seeds import Randomness, generator
@@ -248,13 +249,13 @@ def _matched(
 
 
 def half_chain_estimate(
-    search: RingSearch, options: HalfChainOptions, rng: np.random.Generator
+    search: Equilibria, options: HalfChainOptions, rng: np.random.Generator
 ) -> HalfChainEstimate:
     """ln J by half chains, with every window's estimate.
 
     Parameters
     ----------
-    search : RingSearch
+    search : Equilibria
         Minima of the molecule; tilted halves are centred on them, and plain ones take the
         window's shape and its correction from them.
     rng : numpy.random.Generator
@@ -303,7 +304,7 @@ def half_chain_estimate(
 
 
 def half_chain(
-    target: Chain | RingSearch,
+    target: Chain | Equilibria,
     options: HalfChainOptions | None = None,
     rng: Randomness = 0,
 ) -> JFactor:
@@ -311,7 +312,7 @@ def half_chain(
 
     Parameters
     ----------
-    target : Chain or RingSearch
+    target : Chain or Equilibria
         A molecule, or the minima already found for it.
     rng : int, SeedSequence or Generator
 

@@ -25,7 +25,7 @@ from dnacheck.cyclization.laplace.constrained_minimum import steps_in_RT
 from dnacheck.cyclization.laplace.kernels.anharmonic import scaled_log_weights
 from dnacheck.cyclization.laplace.register import RegisterProfile, register_profile
 from dnacheck.cyclization.result import JFactor, JStatus, link_shares
-from dnacheck.equilibria.discrete.search import RingSearch
+from dnacheck.equilibria.ring import Equilibria
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import InputError, SolveError
 from dnacheck.numerics.seeds import Randomness, seed_sequence
@@ -167,7 +167,7 @@ def anharmonic_term(
 
 
 def corrected_laplace(
-    target: Chain | RingSearch | RegisterProfile,
+    target: Chain | Equilibria | RegisterProfile,
     options: AnharmonicOptions | None = None,
     seed: Randomness = 0,
 ) -> JFactor:

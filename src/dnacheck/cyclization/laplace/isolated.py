@@ -25,9 +25,9 @@ from dnacheck.cyclization.result import (
     JStatus,
     link_shares,
 )
-from dnacheck.equilibria.discrete.search import RingSearch, SearchOptions, find_rings
-from dnacheck.equilibria.discrete.solve import DiscreteRing
+from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
 from dnacheck.equilibria.discrete.spectrum import ProjectedInverse
+from dnacheck.equilibria.ring import Equilibria, Equilibrium
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import SolveError
 
@@ -51,7 +51,7 @@ def log_prefactor(chain: Chain) -> float:
     )
 
 
-def laplace_log_j(ring: DiscreteRing) -> float:
+def laplace_log_j(ring: Equilibrium) -> float:
     """ln J (mol/L) that Laplace's approximation gives one minimum."""
     return log_prefactor(ring.chain) - ring.energy_RT - 0.5 * ring.log_abs_det_kkt
 
@@ -71,7 +71,7 @@ def register_spread(chain: Chain, link: int, angles: Array, multipliers: Array) 
     return math.sqrt(variance) if 0.0 < variance < math.inf else math.inf
 
 
-def require_rings(search: RingSearch) -> RingSearch:
+def require_rings(search: Equilibria) -> Equilibria:
     """The search itself, if it found a ring that is not unstable.
 
     Raises
@@ -87,12 +87,12 @@ def require_rings(search: RingSearch) -> RingSearch:
     return search
 
 
-def laplace(target: Chain | RingSearch, options: SearchOptions | None = None) -> JFactor:
+def laplace(target: Chain | Equilibria, options: SearchOptions | None = None) -> JFactor:
     """J factor by Laplace's approximation, summed over the minima of all links.
 
     Parameters
     ----------
-    target : Chain or RingSearch
+    target : Chain or Equilibria
         A molecule, or the minima already found for it.
     options : SearchOptions, optional
         Where minima are looked for, if they are not given.

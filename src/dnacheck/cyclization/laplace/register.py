@@ -34,7 +34,8 @@ from dnacheck.cyclization.laplace.kernels.gaussian import ROWS
 from dnacheck.cyclization.result import JFactor, JStatus, link_shares
 from dnacheck.equilibria.discrete.kernels.search import best_register
 from dnacheck.equilibria.discrete.kernels.starts import fill_circle
-from dnacheck.equilibria.discrete.search import RingSearch, SearchOptions, find_rings
+from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
+from dnacheck.equilibria.ring import Equilibria
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import SolveError
 
@@ -110,7 +111,7 @@ class RegisterProfile:
     """
 
     chain: Chain
-    search: RingSearch
+    search: Equilibria
     charts: tuple[Chart, ...]
     omitted: float
     seconds: float
@@ -158,7 +159,7 @@ def _log_sum(values: list[float]) -> float:
     return float(np.logaddexp.reduce(values)) if values else -math.inf
 
 
-def _seeds(search: RingSearch) -> dict[int, list[tuple[Array, Array]]]:
+def _seeds(search: Equilibria) -> dict[int, list[tuple[Array, Array]]]:
     """Angles and multipliers (RT) to start from, by link, lowest first.
 
     A search leaves out links whose rings are not isolated minima, as in a straight molecule; the
@@ -273,7 +274,7 @@ def _chart(
 
 
 def register_profile(
-    target: Chain | RingSearch,
+    target: Chain | Equilibria,
     options: RegisterOptions | None = None,
     search_options: SearchOptions | None = None,
 ) -> RegisterProfile:
@@ -281,7 +282,7 @@ def register_profile(
 
     Parameters
     ----------
-    target : Chain or RingSearch
+    target : Chain or Equilibria
         A molecule, or the minima already found for it.
 
     Raises
@@ -335,7 +336,7 @@ def register_profile(
 
 
 def register_laplace(
-    target: Chain | RingSearch | RegisterProfile, options: RegisterOptions | None = None
+    target: Chain | Equilibria | RegisterProfile, options: RegisterOptions | None = None
 ) -> JFactor:
     """J factor by Laplace's approximation at constrained registers, integrated over them.
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from dnacheck.cyclization.method import Target
     from dnacheck.cyclization.result import JFactor
     from dnacheck.cyclization.umbrella.sampling import UmbrellaOptions
-    from dnacheck.equilibria.discrete.search import RingSearch
+    from dnacheck.equilibria.ring import Equilibria
 
 _FIRST_RECORDS = 24
 _MOST_RECORDS = 500
@@ -74,7 +74,7 @@ class Umbrella(Method):
             run.progress(result.samples)
         return result
 
-    def _to_tolerance(self, search: RingSearch, run: Run) -> JFactor:
+    def _to_tolerance(self, search: Equilibria, run: Run) -> JFactor:
         """A pilot, then as long a run as the tolerance or the time asks."""
         from dnacheck.cyclization.result import JStatus
         from dnacheck.cyclization.umbrella.sampling import metropolis

@@ -30,7 +30,8 @@ from dnacheck.cyclization.umbrella.mbar import (
     decorrelate,
     join_series,
 )
-from dnacheck.equilibria.discrete.search import RingSearch, find_rings
+from dnacheck.equilibria.discrete.search import find_rings
+from dnacheck.equilibria.ring import Equilibria
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import InputError
 from dnacheck.numerics.random_numbers import random_state
@@ -277,13 +278,13 @@ def _extrapolated(joined: JoinedSeries) -> tuple[float, float]:
 
 
 def umbrella_estimate(
-    search: RingSearch, options: UmbrellaOptions, rng: np.random.Generator
+    search: Equilibria, options: UmbrellaOptions, rng: np.random.Generator
 ) -> UmbrellaEstimate:
     """ln J by restrained Metropolis chains joined with MBAR.
 
     Parameters
     ----------
-    search : RingSearch
+    search : Equilibria
         Minima of the molecule: chains start there, and the smoothing is corrected from them.
     rng : numpy.random.Generator
         Spawns one stream for each copy.
@@ -332,7 +333,7 @@ def umbrella_estimate(
 
 
 def metropolis(
-    target: Chain | RingSearch,
+    target: Chain | Equilibria,
     options: UmbrellaOptions | None = None,
     rng: Randomness = 0,
 ) -> JFactor:
@@ -340,7 +341,7 @@ def metropolis(
 
     Parameters
     ----------
-    target : Chain or RingSearch
+    target : Chain or Equilibria
         A molecule, or the minima already found for it.
     rng : int, SeedSequence or Generator
 

@@ -25,8 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dnacheck.equilibria.continuum.equations import directors
-from dnacheck.equilibria.continuum.ring import ContinuumRing
 from dnacheck.equilibria.discrete.kernels.closure import linearise
+from dnacheck.equilibria.ring import Equilibrium
 from dnacheck.model.chain import Chain, chain_frames
 from dnacheck.model.rod.filtering import double_filter, padded_steps
 from dnacheck.model.rod.natural_frame import NaturalFrame, evaluate_at_parameter, natural_frame
@@ -127,21 +127,21 @@ def _fitted(chain: Chain, rod: Rod) -> tuple[NaturalFrame, Array]:
 
 
 def corrected_energy(
-    ring: ContinuumRing, chain: Chain, axes: StepAxes | None = None
+    ring: Equilibrium, chain: Chain, axes: StepAxes | None = None
 ) -> CorrectedEnergy:
     """Energy of a continuum ring with the compliance of the steps.
 
     Parameters
     ----------
-    ring : ContinuumRing
+    ring : Equilibrium
     chain : Chain
         The chain that the ring's rod was made from.
     axes : StepAxes, optional
         To save making them again.
     """
     axes = step_axes(chain, ring.rod) if axes is None else axes
-    solution = ring.solution(axes.s)
-    moment = local_moment(solution[:, 3:7], solution[:, :3], ring.loads)
+    solution = ring.curve.solution(axes.s)
+    moment = local_moment(solution[:, 3:7], solution[:, :3], ring.curve.loads)
     compliance = axes.compliance(chain.stiffness)
     uniform = np.array([1.0 / ring.rod.bend_stiffness] * 2 + [1.0 / ring.rod.twist_stiffness])
     # relative compliance of the rod, where it varies, at the hinges

@@ -13,7 +13,7 @@ from dnacheck.numerics.outcome import InputError
 from dnacheck.numerics.superpose import superpose
 
 if TYPE_CHECKING:
-    from dnacheck.equilibria.continuum.ring import ContinuumRing
+    from dnacheck.equilibria.ring import Equilibrium
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ class Reconstruction:
     projection: float
 
 
-def reconstruct(ring: ContinuumRing, step_form: StepForm = "wedge") -> Reconstruction:
+def reconstruct(ring: Equilibrium, step_form: StepForm = "wedge") -> Reconstruction:
     """Sample a continuum ring at its base pairs.
 
     The centres are taken evenly along the centreline, shifted back by half a step,
@@ -57,7 +57,7 @@ def reconstruct(ring: ContinuumRing, step_form: StepForm = "wedge") -> Reconstru
 
     Parameters
     ----------
-    ring : ContinuumRing
+    ring : Equilibrium
         In units of its own length, which is N steps.
     step_form : {"wedge", "midstep"}
         How the angles make a rotation, as in the chain.
@@ -72,14 +72,14 @@ def reconstruct(ring: ContinuumRing, step_form: StepForm = "wedge") -> Reconstru
     shifted = ((2.0 * index - 1.0) / (2.0 * n)) % 1.0
     order = np.argsort(shifted)
     centres = np.empty((n + 1, 3))
-    centres[order] = n * ring.centreline(shifted[order])
+    centres[order] = n * ring.curve.centreline(shifted[order])
     centres[n] = centres[0]
     edges = np.diff(centres, axis=0)
     lengths = np.linalg.norm(edges, axis=1)
     if not np.min(lengths) > 1e-6:
         raise InputError("reconstruction: two base-pair centres coincide on the continuum ring")
     d3 = np.vstack([edges / lengths[:, None], edges[:1] / lengths[0]])
-    d1 = ring.true_frames(np.arange(n + 1) / n)[:, :, 0]
+    d1 = ring.curve.true_frames(np.arange(n + 1) / n)[:, :, 0]
     along = np.sum(d1 * d3, axis=1)
     if np.max(np.abs(along)) > _PARALLEL:
         raise InputError("reconstruction: a d1 lies along the centreline; refine the mesh")

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from dnacheck.equilibria.continuation.parameters import Parameter
 from dnacheck.equilibria.continuum.collocation import Discretisation
 from dnacheck.equilibria.continuum.options import ContinuumOptions
-from dnacheck.equilibria.continuum.ring import ContinuumRing
 from dnacheck.equilibria.continuum.solver import refine
 from dnacheck.equilibria.continuum.state import State, new_state, run_newton
+from dnacheck.equilibria.ring import Equilibrium
 from dnacheck.model.rod.rod import Rod
 from dnacheck.numerics.curve_topology import polygon_writhe
 from dnacheck.numerics.outcome import DnaCheckError
@@ -219,7 +219,7 @@ class Branch:
         out.setflags(write=False)
         return out
 
-    def ring(self, point: int | SpecialPoint) -> ContinuumRing:
+    def ring(self, point: int | SpecialPoint) -> Equilibrium:
         """The ring at a point of the branch, on the branch's mesh."""
         if isinstance(point, SpecialPoint):
             value, loads, slopes = point.parameter, point.loads, point.slopes
@@ -242,7 +242,7 @@ def _place(state: State) -> None:
 
 def ring_from(
     disc: Discretisation, active: Parameter, value: float, loads: Array, slopes: Array
-) -> ContinuumRing:
+) -> Equilibrium:
     """Continuum ring of a solution of a family, on the same mesh."""
     from dnacheck.equilibria.continuum.collocation import discretise
 

@@ -21,7 +21,6 @@ from dnacheck.equilibria.continuation.walker import Spot, Walker
 from dnacheck.equilibria.continuum.collocation import Discretisation, aligned_mesh, discretise
 from dnacheck.equilibria.continuum.homotopy import detours
 from dnacheck.equilibria.continuum.options import ContinuumOptions
-from dnacheck.equilibria.continuum.ring import ContinuumRing
 from dnacheck.equilibria.continuum.search import lowest_continuum_ring
 from dnacheck.equilibria.continuum.state import (
     State,
@@ -31,6 +30,7 @@ from dnacheck.equilibria.continuum.state import (
     start_from_perfect_ring,
     transfer,
 )
+from dnacheck.equilibria.ring import Equilibrium
 from dnacheck.model.rod.rod import Rod
 from dnacheck.numerics.outcome import InputError
 
@@ -136,7 +136,7 @@ def perfect_diagram(
 
 def imperfect_component(
     rod: Rod,
-    start: float | ContinuumRing,
+    start: float | Equilibrium,
     turn: float = 0.0,
     bounds: Bounds | None = None,
     options: ContinuationOptions | None = None,
@@ -150,7 +150,7 @@ def imperfect_component(
     Parameters
     ----------
     rod : Rod
-    start : float or ContinuumRing
+    start : float or Equilibrium
         A ring on the component, or alpha in radians: the ring is then sought from the rolled
         perfect ring.
     turn : float
@@ -164,8 +164,8 @@ def imperfect_component(
     """
     options = ContinuationOptions() if options is None else options
     disc = mesh_for(rod, options)
-    if isinstance(start, ContinuumRing):
-        state, alpha = _state_of(start, disc), start.alpha
+    if isinstance(start, Equilibrium):
+        state, alpha = _state_of(start, disc), start.curve.alpha
     else:
         alpha = float(start)
         if not np.isfinite(alpha):
@@ -218,7 +218,7 @@ def curvature_branch(
 
 def ratio_branch(
     rod: Rod,
-    ring: ContinuumRing,
+    ring: Equilibrium,
     bounds: Bounds | None = None,
     options: ContinuationOptions | None = None,
 ) -> Branch:
@@ -229,7 +229,7 @@ def ratio_branch(
     _check_bounds(bounds, start, "twist_ratio")
     disc = mesh_for(rod, options)
     state = _state_of(ring, disc)
-    walker, spot = start_walker(disc, twist_ratio(ring.alpha), options, start, state)
+    walker, spot = start_walker(disc, twist_ratio(ring.curve.alpha), options, start, state)
     return follow_branch(walker, spot, bounds)
 
 
@@ -287,17 +287,17 @@ def _shares(new: Component, old: Component) -> bool:
     return False
 
 
-def _state_of(ring: ContinuumRing, disc: Discretisation) -> State:
-    own = discretise(ring.rod, ring.mesh, ring.degree)
+def _state_of(ring: Equilibrium, disc: Discretisation) -> State:
+    own = discretise(ring.rod, ring.curve.mesh, ring.curve.degree)
     state = new_state(own)
-    state.slopes[:] = ring.slopes
-    state.loads[:] = ring.loads
-    state.centres[:] = ring.centres
+    state.slopes[:] = ring.curve.slopes
+    state.loads[:] = ring.curve.loads
+    state.centres[:] = ring.curve.centres
     moved = transfer(state, disc.mesh)
     if moved.disc.rule.points.size == disc.rule.points.size:
         return moved
     raise InputError(
-        f"the ring has {ring.degree} points per interval, the diagram "
+        f"the ring has {ring.curve.degree} points per interval, the diagram "
         f"{disc.rule.points.size}: give both the same degree"
     )
 

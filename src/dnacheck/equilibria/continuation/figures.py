@@ -20,7 +20,7 @@ from dnacheck.equilibria.continuation.twist_ratio import (
     sweep_continuum,
     sweep_discrete,
 )
-from dnacheck.equilibria.continuum.ring import ContinuumRing
+from dnacheck.equilibria.ring import Equilibrium
 from dnacheck.model.chain import Chain
 from dnacheck.model.rod import RodOptions, build_rod
 from dnacheck.model.rod.rod import Rod
@@ -102,13 +102,13 @@ def figure_7(rod: Rod, options: ContinuationOptions | None = None) -> dict[str, 
     return data
 
 
-def marked_rings(component: Component) -> tuple[ContinuumRing, ...]:
+def marked_rings(component: Component) -> tuple[Equilibrium, ...]:
     """Rings with alpha = Omega(1) - Omega(0) modulo 2 pi, lowest first, each once."""
     first = component.branches[0]
     return tuple(first.ring(point) for point in component.of_kind(Kind.MARK))
 
 
-def ring_shape(ring: ContinuumRing, points: int = 400, width_A: float = 10.0) -> dict[str, Any]:
+def ring_shape(ring: Equilibrium, points: int = 400, width_A: float = 10.0) -> dict[str, Any]:
     """Tube and ribbon of a ring (Figures 8 and 9).
 
     Returns
@@ -119,15 +119,15 @@ def ring_shape(ring: ContinuumRing, points: int = 400, width_A: float = 10.0) ->
     """
     s = np.linspace(0.0, 1.0, points)
     length = ring.rod.n_steps * ring.rod.rise_A
-    centreline = length * ring.centreline(s)
+    centreline = length * ring.curve.centreline(s)
     scale = ring.rod.energy_scale_RT
     return {
         "s": s,
         "centreline": centreline,
-        "true_ribbon": centreline + width_A * ring.true_frames(s)[..., 0],
-        "natural_ribbon": centreline + width_A * ring.natural_frames(s)[..., 0],
+        "true_ribbon": centreline + width_A * ring.curve.true_frames(s)[..., 0],
+        "natural_ribbon": centreline + width_A * ring.curve.natural_frames(s)[..., 0],
         "energy": ring.energy * scale,
-        "end_moment": ring.end_moment * scale,
+        "end_moment": ring.curve.end_moment * scale,
         "link": ring.link,
         "stable": ring.stable,
     }

@@ -85,22 +85,22 @@ class ContinuumModel:
         for ring in search.equilibria:
             if not ring.stable:
                 continue
-            unknowns = np.concatenate([ring.slopes.ravel(), ring.loads])
+            unknowns = np.concatenate([ring.curve.slopes.ravel(), ring.curve.loads])
             energy = ring.energy
             if self.axes is not None:
-                solution = ring.solution(self.axes.s)
+                solution = ring.curve.solution(self.axes.s)
                 energy = self._corrected(
-                    energy, ratio, solution[:, 3:7], solution[:, :3], ring.loads
+                    energy, ratio, solution[:, 3:7], solution[:, :3], ring.curve.loads
                 )
             found.append(
                 Minimum(
                     energy,
-                    ring.bend,
-                    ring.twist,
+                    ring.curve.bend,
+                    ring.curve.twist,
                     ring.link,
                     ring.residual,
                     unknowns,
-                    ring.alpha,
+                    ring.curve.alpha,
                 )
             )
         return found

@@ -1,14 +1,14 @@
 """Continuum rings: the boundary-value problem (4.9) with (4.11) by Gauss collocation."""
 
 from dnacheck.equilibria.continuum.options import ContinuumOptions
-from dnacheck.equilibria.continuum.ring import ContinuumRing
-from dnacheck.equilibria.continuum.search import ContinuumSearch, lowest_continuum_ring
+from dnacheck.equilibria.continuum.search import Equilibria, lowest_continuum_ring
 from dnacheck.equilibria.continuum.solver import solve_continuum_ring
+from dnacheck.equilibria.ring import Equilibrium
 
 __all__ = [
     "ContinuumOptions",
-    "ContinuumRing",
-    "ContinuumSearch",
+    "Equilibria",
+    "Equilibrium",
     "lowest_continuum_ring",
     "solve_continuum_ring",
 ]

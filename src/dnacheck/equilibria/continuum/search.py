@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections import Counter
+import time
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
 from dnacheck.equilibria.continuum.options import ContinuumOptions
-from dnacheck.equilibria.continuum.ring import ContinuumRing
 from dnacheck.equilibria.continuum.solver import SOLVED, attempts
+from dnacheck.equilibria.ring import Equilibria, Equilibrium
 from dnacheck.model.rod.rod import Rod
-from dnacheck.numerics.outcome import InputError, SolveError, Status
+from dnacheck.numerics.outcome import InputError, Status
 
 # Two results are the same equilibrium when energies (relative to the flat ring's) and loads
 # (relative to the largest) agree to this; converged results agree to far better, distinct ones
@@ -25,69 +24,6 @@ _ALL_LINKS_REACH = 2
 # With K3 of a hundredth of K1 and less, hundreds of links have nearly the same energy.
 _MOST_LINKS = 13
 _ALL_REGISTERS = 8
-
-
-@dataclass(frozen=True)
-class ContinuumSearch:
-    """What a search found.
-
-    Attributes
-    ----------
-    equilibria : tuple of ContinuumRing
-        Every distinct equilibrium, saddles included, lowest energy first. Where one link was asked
-        for, of that link only.
-    failures : tuple of ContinuumRing
-        Starts that did not converge, with status and residual.
-    links : tuple of int
-        Links that were tried.
-    status : Status
-        NOT_FOUND also where every equilibrium is a saddle.
-    elsewhere : tuple of ContinuumRing
-        Equilibria of other links that starts of the one link asked for led to.
-    """
-
-    equilibria: tuple[ContinuumRing, ...]
-    failures: tuple[ContinuumRing, ...]
-    links: tuple[int, ...]
-    status: Status
-    elsewhere: tuple[ContinuumRing, ...] = ()
-
-    @property
-    def minima(self) -> tuple[ContinuumRing, ...]:
-        """The equilibria that are not unstable, lowest first."""
-        return tuple(ring for ring in self.equilibria if ring.stable is not False)
-
-    @property
-    def lowest(self) -> ContinuumRing:
-        """The minimum of least energy.
-
-        Raises
-        ------
-        SolveError
-            When no minimum was found; ``partial`` is this search.
-        """
-        if not self.minima:
-            raise SolveError(f"continuum ring: {self.reason}", self)
-        return self.minima[0]
-
-    @property
-    def reason(self) -> str:
-        """Why there is no minimum, in one line."""
-        links = f"link{'s' if len(self.links) > 1 else ''} {', '.join(map(str, self.links))}"
-        ends: Counter[str] = Counter()
-        for ring in self.equilibria:
-            ends[f"saddle of link {ring.link} ({ring.energy_RT:.4f} RT)"] += 1
-        for ring in self.elsewhere:
-            kind = "saddle" if ring.stable is False else "ring"
-            ends[f"{kind} of link {ring.link} ({ring.energy_RT:.4f} RT)"] += 1
-        if self.failures:
-            nearest = min(ring.residual for ring in self.failures)
-            text = f"start{'s' if len(self.failures) > 1 else ''} without convergence"
-            ends[f"{text} (residual {nearest:.0e} at best)"] += len(self.failures)
-        reached = ", ".join(f"{count} {what}" for what, count in ends.items())
-        if self.equilibria:
-            return f"only saddles were found at {links}: {reached}"
-        return f"no equilibrium was found at {links}, but {reached}; search links auto or all"
 
 
 def candidate_links(rod: Rod) -> tuple[int, ...]:
@@ -110,7 +46,7 @@ def lowest_continuum_ring(
     links: str | int | Iterable[int] = "auto",
     options: ContinuumOptions | None = None,
     registers: int | None = None,
-) -> ContinuumSearch:
+) -> Equilibria:
     """Search links and registers for continuum rings.
 
     Each link starts from the perfect ring in the register that first-order perturbation prefers;
@@ -142,13 +78,15 @@ def lowest_continuum_ring(
     if registers < 1:
         raise InputError(f"registers = {registers}: give at least 1")
     turns = 2.0 * np.pi / registers * np.arange(registers)
-    found: list[ContinuumRing] = []
-    failures: list[ContinuumRing] = []
+    began, starts = time.perf_counter(), 0
+    found: list[Equilibrium] = []
+    failures: list[Equilibrium] = []
     pending: dict[int, list[float]] = {}
     for link in wanted:
         # Registers in turn, with detours, until one of them gives a minimum.
         pending[link] = list(turns)
         while pending[link]:
+            starts += 1
             if _collect(attempts(rod, link, pending[link].pop(0), options), found, failures):
                 break
     for link in wanted:
@@ -157,6 +95,7 @@ def lowest_continuum_ring(
         if not here or min(here) > min(ring.energy for ring in found) + window:
             continue
         for turn in pending[link]:
+            starts += 1
             _collect(attempts(rod, link, turn, options, detour=False), found, failures)
     found.sort(key=lambda ring: ring.energy)
     one = wanted[0] if isinstance(links, (int, np.integer)) else None
@@ -164,7 +103,16 @@ def lowest_continuum_ring(
     minima = any(ring.stable is not False for ring in kept)
     status = Status.CONVERGED if minima else Status.NOT_FOUND
     elsewhere = tuple(ring for ring in found if one is not None and ring.link != one)
-    return ContinuumSearch(kept, tuple(failures), tuple(wanted), status, elsewhere)
+    return Equilibria(
+        source=rod,
+        equilibria=kept,
+        links_searched=tuple(wanted),
+        starts=starts,
+        failed_starts=len(failures),
+        seconds=time.perf_counter() - began,
+        status=status,
+        ends=(*elsewhere, *failures),
+    )
 
 
 def _wanted_links(rod: Rod, links: str | int | Iterable[int]) -> list[int]:
@@ -183,7 +131,7 @@ def _wanted_links(rod: Rod, links: str | int | Iterable[int]) -> list[int]:
 
 
 def _collect(
-    rings: Iterable[ContinuumRing], found: list[ContinuumRing], failures: list[ContinuumRing]
+    rings: Iterable[Equilibrium], found: list[Equilibrium], failures: list[Equilibrium]
 ) -> bool:
     """Sort rings into the lists until one is not unstable; True if there was one."""
     for ring in rings:
@@ -197,13 +145,13 @@ def _collect(
     return False
 
 
-def _same(a: ContinuumRing, b: ContinuumRing) -> bool:
-    if a.status is Status.SINGULAR or b.status is Status.SINGULAR:
+def _same(a: Equilibrium, b: Equilibrium) -> bool:
+    if a.status is Status.NEUTRAL or b.status is Status.NEUTRAL:
         # members of one family: loads turn with the register
-        a_size, b_size = np.linalg.norm(a.loads), np.linalg.norm(b.loads)
+        a_size, b_size = np.linalg.norm(a.curve.loads), np.linalg.norm(b.curve.loads)
         agree = abs(a_size - b_size) < 1e2 * _SAME * max(a_size, b_size)
     else:
-        size = max(float(np.max(np.abs(a.loads))), float(np.max(np.abs(b.loads))))
-        agree = float(np.max(np.abs(a.loads - b.loads))) < 1e2 * _SAME * size
+        size = max(float(np.max(np.abs(a.curve.loads))), float(np.max(np.abs(b.curve.loads))))
+        agree = float(np.max(np.abs(a.curve.loads - b.curve.loads))) < 1e2 * _SAME * size
     scale = a.rod.bend_stiffness * (2.0 * np.pi) ** 2
     return bool(agree and a.link == b.link and abs(a.energy - b.energy) < _SAME * scale)

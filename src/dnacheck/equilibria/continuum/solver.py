@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dnacheck.equilibria.continuum.collocation import aligned_mesh, bisect, discretise
+from dnacheck.equilibria.continuum.curve import Curve
 from dnacheck.equilibria.continuum.homotopy import detours
 from dnacheck.equilibria.continuum.kernels import newton as kernel
 from dnacheck.equilibria.continuum.options import ContinuumOptions
-from dnacheck.equilibria.continuum.ring import ContinuumRing
 from dnacheck.equilibria.continuum.state import (
     State,
     new_state,
@@ -21,6 +21,7 @@ from dnacheck.equilibria.continuum.state import (
     start_from_perfect_ring,
     transfer,
 )
+from dnacheck.equilibria.ring import Equilibrium
 from dnacheck.model.rod.rod import Rod
 from dnacheck.numerics.curve_topology import polygon_writhe
 from dnacheck.numerics.outcome import Status
@@ -31,11 +32,11 @@ _STATUS = {
     kernel.CONVERGED: Status.CONVERGED,
     kernel.NOT_FINITE: Status.NOT_FINITE,
     kernel.ITERATION_LIMIT: Status.ITERATION_LIMIT,
-    kernel.NEUTRAL_MODE: Status.SINGULAR,
+    kernel.NEUTRAL_MODE: Status.NEUTRAL,
 }
 
 #: Statuses of a state that satisfies the equations.
-SOLVED = (Status.CONVERGED, Status.SADDLE, Status.SINGULAR, Status.MESH_LIMIT)
+SOLVED = (Status.CONVERGED, Status.SADDLE, Status.NEUTRAL, Status.MESH_LIMIT)
 
 # Energies are compared with at least this fraction of the flat ring's, so that a rod that closes
 # by itself, with energy zero, has a scale.
@@ -50,7 +51,7 @@ def solve_continuum_ring(
     link: int,
     turn: float = 0.0,
     options: ContinuumOptions | None = None,
-) -> ContinuumRing:
+) -> Equilibrium:
     """Equilibrium ring of a rod, started from the rolled perfect ring.
 
     Newton starts from the perfect ring (4.12) in the register that first-order perturbation in
@@ -69,13 +70,13 @@ def solve_continuum_ring(
 
     Returns
     -------
-    ContinuumRing
+    Equilibrium
         Check ``status``: what did not converge is returned too, with its residual. SADDLE is an
-        equilibrium with negative directions; SINGULAR a solution to tolerance that is not
+        equilibrium with negative directions; NEUTRAL a solution to tolerance that is not
         isolated, of which any member of the family may have been returned.
     """
     options = ContinuumOptions() if options is None else options
-    ring: ContinuumRing | None = None
+    ring: Equilibrium | None = None
     for ring in attempts(rod, link, turn, options):
         if ring.status in SOLVED:
             break
@@ -85,7 +86,7 @@ def solve_continuum_ring(
 
 def attempts(
     rod: Rod, link: int, turn: float, options: ContinuumOptions, detour: bool = True
-) -> Iterator[ContinuumRing]:
+) -> Iterator[Equilibrium]:
     """Rings from one start by Newton, then by each path of ``homotopy``, converged or not."""
     alpha = rod.end_rotation + 2.0 * np.pi * link
     disc = discretise(rod, aligned_mesh(rod.breaks, options.intervals), options.degree)
@@ -104,7 +105,7 @@ def attempts(
             yield _finish(state, alpha, _STATUS[state.code], options)
 
 
-def refine(state: State, alpha: float, options: ContinuumOptions) -> ContinuumRing:
+def refine(state: State, alpha: float, options: ContinuumOptions) -> Equilibrium:
     """Adapt the mesh of a converged state as the options ask, and freeze the result."""
     if not options.adapt:
         return _finish(state, alpha, _STATUS[state.code], options)
@@ -169,7 +170,7 @@ def _finish(
     options: ContinuumOptions,
     energy_error: float | None = None,
     shape_error: float | None = None,
-) -> ContinuumRing:
+) -> Equilibrium:
     """Freeze a state into a result."""
     rod = state.disc.rod
     quaternions = state.quaternions()
@@ -188,7 +189,7 @@ def _finish(
             status = Status.SADDLE
     # a neutral direction leaves open whether the energy rises along it
     stable = None if conjugate is None else conjugate == 0
-    if status is Status.SINGULAR and stable:
+    if status is Status.NEUTRAL and stable:
         stable = None
     arrays = {
         "loads": state.loads.copy(),
@@ -199,22 +200,26 @@ def _finish(
     }
     for array in arrays.values():
         array.setflags(write=False)
-    return ContinuumRing(
-        rod=rod,
-        alpha=alpha,
+    return Equilibrium(
+        source=rod,
+        solution=Curve(
+            rod=rod,
+            alpha=alpha,
+            bend=bend,
+            twist=twist,
+            end_moment=float(state.loads[2]),
+            energy_error=energy_error,
+            shape_error=shape_error,
+            **arrays,
+        ),
         energy=bend + twist,
-        bend=bend,
-        twist=twist,
-        link=link,
+        ring_link=link,
+        twist_turns=link - writhe,
         writhe=writhe,
-        end_moment=float(state.loads[2]),
         stable=stable,
-        conjugate_points=conjugate,
+        negative_directions=conjugate,
         residual=state.residual,
-        energy_error=energy_error,
-        shape_error=shape_error,
         iterations=state.iterations,
         seconds=time.perf_counter() - state.began,
         status=status,
-        **arrays,
     )

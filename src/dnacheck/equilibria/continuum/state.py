@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dnacheck.equilibria.continuum.collocation import Discretisation, discretise
+from dnacheck.equilibria.continuum.curve import evaluate_curve
 from dnacheck.equilibria.continuum.kernels import newton as kernel
 from dnacheck.equilibria.continuum.kernels.condense import COLUMNS, FINE, condense
 from dnacheck.equilibria.continuum.kernels.interpolate import (
@@ -17,7 +18,6 @@ from dnacheck.equilibria.continuum.kernels.interpolate import (
 )
 from dnacheck.equilibria.continuum.kernels.start import overlap, rolled_ring
 from dnacheck.equilibria.continuum.options import ContinuumOptions
-from dnacheck.equilibria.continuum.ring import evaluate_ring
 
 Array = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ class State:
 
     def evaluate(self, s: Array, quaternions: Array) -> tuple[Array, Array, Array]:
         """q (m, 4), r (m, 3) and the laboratory strain rate u (m, 3) at the points s."""
-        return evaluate_ring(s, self.disc.mesh, self.slopes, quaternions, self.centres)
+        return evaluate_curve(s, self.disc.mesh, self.slopes, quaternions, self.centres)
 
 
 def new_state(disc: Discretisation) -> State:

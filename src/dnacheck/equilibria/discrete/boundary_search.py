@@ -19,8 +19,9 @@ from scipy.spatial.transform import Rotation
 
 from dnacheck.equilibria.boundary import AnyBoundary, HingedRing, Loop, NickedRing, Pull
 from dnacheck.equilibria.discrete.kernels.search import fill_start, predicted_registers
-from dnacheck.equilibria.discrete.search import RingSearch, SearchOptions, find_rings
-from dnacheck.equilibria.discrete.solve import RING, DiscreteRing, NewtonOptions, solve_ring
+from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
+from dnacheck.equilibria.discrete.solve import NewtonOptions, solve_ring
+from dnacheck.equilibria.ring import RING, Equilibria, Equilibrium
 from dnacheck.model.chain import Chain, chain_frames
 from dnacheck.numerics.outcome import InputError, Status
 
@@ -37,7 +38,7 @@ _MOST_PIECES = 64
 
 def find_equilibria(
     chain: Chain, boundary: AnyBoundary = RING, options: SearchOptions | None = None
-) -> RingSearch:
+) -> Equilibria:
     """Minima of a chain held by a boundary, lowest energy (less the work of loads) first.
 
     Parameters
@@ -63,7 +64,7 @@ def find_equilibria(
     newton = NewtonOptions(
         options.newton.tolerance, options.newton.max_iterations, options.newton.turn_cap
     )
-    found: list[DiscreteRing] = []
+    found: list[Equilibrium] = []
     starts, failed = 0, 0
     for ring in _solutions(chain, boundary, options.links == "all", newton):
         starts += 1
@@ -72,8 +73,8 @@ def find_equilibria(
         elif not any(_same(ring, other) for other in found):
             found.append(ring)
     found.sort(key=_potential)
-    return RingSearch(
-        chain=chain,
+    return Equilibria(
+        source=chain,
         equilibria=tuple(found),
         links_searched=(),
         starts=starts,
@@ -83,7 +84,7 @@ def find_equilibria(
     )
 
 
-def _potential(ring: DiscreteRing) -> float:
+def _potential(ring: Equilibrium) -> float:
     """Energy less the work of the loads; the same at all minima of one search but for turns."""
     if not isinstance(ring.boundary, Pull):
         return ring.energy
@@ -91,7 +92,7 @@ def _potential(ring: DiscreteRing) -> float:
     return ring.energy - float(loads[2] * ring.centres[-1, 2])
 
 
-def _same(a: DiscreteRing, b: DiscreteRing) -> bool:
+def _same(a: Equilibrium, b: Equilibrium) -> bool:
     if abs(a.energy - b.energy) > _SAME_ENERGY * abs(a.energy) + 1e-14:
         return False
     if a.stable is None and b.stable is None:
@@ -101,7 +102,7 @@ def _same(a: DiscreteRing, b: DiscreteRing) -> bool:
 
 def _solutions(
     chain: Chain, boundary: AnyBoundary, everything: bool, newton: NewtonOptions
-) -> Iterator[DiscreteRing | None]:
+) -> Iterator[Equilibrium | None]:
     """What every start leads to; None where the way to it ended."""
     if isinstance(boundary, Loop):
         yield from _loops(chain, boundary, everything, newton)
@@ -131,7 +132,7 @@ def _solutions(
 
 def _loops(
     chain: Chain, boundary: Loop, everything: bool, newton: NewtonOptions
-) -> Iterator[DiscreteRing | None]:
+) -> Iterator[Equilibrium | None]:
     centres, frames = chain_frames(chain.ground, chain.step_form)
     yield _approach(chain, chain.ground, centres[-1], frames[-1], boundary, newton)
     search = find_rings(chain, SearchOptions("all" if everything else "auto", newton))
@@ -141,7 +142,7 @@ def _loops(
 
 def _approach(
     chain: Chain, angles: Array, centre: Array, frame: Array, target: Loop, newton: NewtonOptions
-) -> DiscreteRing | None:
+) -> Equilibrium | None:
     """The loop that is reached when the end of a chain is led from a pose to the target's.
 
     In one step if Newton's method manages it, else in ever more; the turn is the shortest.

@@ -24,9 +24,10 @@ from dnacheck.equilibria.discrete.kernels.search import (
     fill_start,
     search,
 )
-from dnacheck.equilibria.discrete.solve import DiscreteRing, NewtonOptions, make_ring, solve_ring
+from dnacheck.equilibria.discrete.solve import NewtonOptions, make_ring, solve_ring
+from dnacheck.equilibria.ring import Equilibria, Equilibrium
 from dnacheck.model.chain import Chain
-from dnacheck.numerics.outcome import InputError, SolveError, Status
+from dnacheck.numerics.outcome import InputError, Status
 
 LinkChoice = Literal["auto", "all"] | int
 
@@ -72,63 +73,6 @@ class SearchOptions:
             self.links in ("auto", "all") or isinstance(self.links, int)
         ):
             raise InputError(f"link must be auto, all or an integer, not {self.links!r}")
-
-
-@dataclass(frozen=True)
-class RingSearch:
-    """Every distinct minimum that a search found, lowest first.
-
-    Attributes
-    ----------
-    chain : Chain
-    equilibria : tuple of DiscreteRing
-        Where one link was asked for, minima of that link only.
-    links_searched : tuple of int
-        Links of the starting shapes. A start may relax to another link of the same parity,
-        because chains may pass through themselves.
-    starts, failed_starts : int
-        Starting shapes, and those of them that did not converge.
-    seconds : float
-    status : Status
-    ends : tuple of DiscreteRing
-        Where the starts came to an end, if one link was asked for and no ring of it was found.
-    notes : tuple of str
-        Bounds that the search met, and what became of a link that has no ring.
-    """
-
-    chain: Chain
-    equilibria: tuple[DiscreteRing, ...]
-    links_searched: tuple[int, ...]
-    starts: int
-    failed_starts: int
-    seconds: float
-    status: Status
-    ends: tuple[DiscreteRing, ...] = ()
-    notes: tuple[str, ...] = ()
-
-    @property
-    def lowest(self) -> DiscreteRing:
-        """The minimum of lowest energy.
-
-        Raises
-        ------
-        SolveError
-            None was found.
-        """
-        if not self.equilibria:
-            raise SolveError(f"discrete ring of {self.chain.name}: {self.reason}", self)
-        return self.equilibria[0]
-
-    @property
-    def reason(self) -> str:
-        """Why there is no ring, in one line."""
-        if self.notes:
-            return "; ".join(self.notes)
-        return (
-            f"no stable ring at links {', '.join(map(str, self.links_searched))}: "
-            f"{self.failed_starts} of {self.starts} starts did not converge to one; search links "
-            "all, or others"
-        )
 
 
 def candidate_links(chain: Chain) -> tuple[int, ...]:
@@ -184,7 +128,7 @@ def room(plan: SearchPlan) -> int:
     return min(_MOST_MINIMA, len(plan.links) * (3 + len(plan.registers)))
 
 
-def find_rings(chain: Chain, options: SearchOptions | None = None) -> RingSearch:
+def find_rings(chain: Chain, options: SearchOptions | None = None) -> Equilibria:
     """Minima of the closed chain over links and registers, lowest first.
 
     Every start is a planar ring of a given link, rolled to a register that second-order
@@ -208,7 +152,7 @@ def search_minima(
     registers: NDArray[Any],
     window: float,
     options: NewtonOptions,
-) -> RingSearch:
+) -> Equilibria:
     """Minima reached from planar rings of the given links and registers.
 
     Each link starts from the register where its planar ring is predicted to rest. Links whose
@@ -225,7 +169,7 @@ def search_minima(
     return _searched(chain, plan, options)
 
 
-def _searched(chain: Chain, plan: SearchPlan, options: NewtonOptions) -> RingSearch:
+def _searched(chain: Chain, plan: SearchPlan, options: NewtonOptions) -> Equilibria:
     most = room(plan)
     minima = Minima(
         np.empty((most, *chain.ground.shape)),
@@ -251,8 +195,8 @@ def _searched(chain: Chain, plan: SearchPlan, options: NewtonOptions) -> RingSea
         for i in order
     )
     notes = (f"only the first {most} minima found were kept",) if found == _MOST_MINIMA else ()
-    return RingSearch(
-        chain=chain,
+    return Equilibria(
+        source=chain,
         equilibria=rings,
         links_searched=tuple(int(link) for link in plan.links[minima.tried]),
         starts=starts,
@@ -263,7 +207,7 @@ def _searched(chain: Chain, plan: SearchPlan, options: NewtonOptions) -> RingSea
     )
 
 
-def _of_one_link(found: RingSearch, link: int, options: NewtonOptions) -> RingSearch:
+def _of_one_link(found: Equilibria, link: int, options: NewtonOptions) -> Equilibria:
     """The search with nothing but rings of the link asked for."""
     here = tuple(ring for ring in found.equilibria if ring.link == link)
     if here:
@@ -291,7 +235,7 @@ def _of_one_link(found: RingSearch, link: int, options: NewtonOptions) -> RingSe
 
 def _given_its_twist(
     chain: Chain, link: int, options: NewtonOptions
-) -> tuple[DiscreteRing | None, float]:
+) -> tuple[Equilibrium | None, float]:
     """A ring relaxed at a link, followed as its steps take the chain's own ground twist.
 
     Returns
@@ -308,7 +252,7 @@ def _given_its_twist(
         return replace(chain, ground=ground)
 
     relaxed = _searched(at(0.0), search_plan(chain, link), options)
-    best: DiscreteRing | None = None
+    best: Equilibrium | None = None
     kept = 0.0
     for start in relaxed.equilibria:
         ring = start
@@ -326,7 +270,7 @@ def _given_its_twist(
     return best, kept
 
 
-def _ends(chain: Chain, link: int, options: NewtonOptions) -> Iterator[DiscreteRing]:
+def _ends(chain: Chain, link: int, options: NewtonOptions) -> Iterator[Equilibrium]:
     """Where planar rings of a link come to an end, from all registers."""
     arrays = chain.arrays
     first = best_register(arrays, link)
@@ -336,7 +280,7 @@ def _ends(chain: Chain, link: int, options: NewtonOptions) -> Iterator[DiscreteR
         yield solve_ring(chain, start, replace(options, minima_only=True), throw=False)
 
 
-def _summary(ends: tuple[DiscreteRing, ...]) -> str:
+def _summary(ends: tuple[Equilibrium, ...]) -> str:
     """How many starts ended at which link, energy and residual."""
     counts: Counter[str] = Counter()
     worst: dict[str, float] = {}

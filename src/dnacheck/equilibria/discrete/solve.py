@@ -5,15 +5,14 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dnacheck.equilibria.boundary import AnyBoundary, Loop, Pull, Ring
+from dnacheck.equilibria.boundary import AnyBoundary, Loop, Pull
 from dnacheck.equilibria.discrete.kernels import newton as nk
-from dnacheck.equilibria.discrete.spectrum import smallest_projected_eigenvalue
-from dnacheck.model.chain import Chain, chain_frames, elastic_energy, energy_parts
+from dnacheck.equilibria.ring import RING, Equilibrium, Steps
+from dnacheck.model.chain import Chain, chain_frames, elastic_energy
 from dnacheck.numerics.curve_topology import (
     edge_frames,
     link_of_ring,
@@ -22,8 +21,6 @@ from dnacheck.numerics.curve_topology import (
 from dnacheck.numerics.outcome import InputError, SolveError, Status
 
 Array = NDArray[np.float64]
-
-RING = Ring()
 
 _STATUS = {
     nk.CONVERGED: Status.CONVERGED,
@@ -76,117 +73,6 @@ class NewtonOptions:
         )
 
 
-@dataclass(frozen=True)
-class DiscreteRing:
-    """A closed equilibrium of a chain, or the point where its search ended.
-
-    Attributes
-    ----------
-    chain : Chain
-        The molecule.
-    angles : ndarray, shape (N, c)
-        Coordinates of each step: tau, theta, phi in radians, or the six of a rigid step; read-only.
-    multipliers : ndarray, shape (6,)
-        Force (reduced energy per step length) and moment (reduced energy per radian) of closure,
-        in the frame of the target (the first base pair's for a ring): gradient + (closure
-        Jacobian)^T multipliers = 0. Minus the loads on components that are free.
-    energy : float
-        Reduced elastic energy (2.3).
-    ring_link : int or None
-        Turns of the frames about the ring; twist + writhe. None unless the boundary is a ring.
-    twist, writhe : float
-        In turns, of the polygon of base-pair centres. Without a link the twist ends at the nick,
-        and the writhe is not a number where the ends do not meet.
-    stable : bool or None
-        Whether the projected Hessian is positive; None where the search did not converge, or
-        where an eigenvalue is zero to round-off (``status`` tells which).
-    negative_eigenvalues : int
-        Of the projected Hessian, round-off apart.
-    log_abs_det_kkt : float
-        log |det| of the matrix [[H, G^T], [G, 0]], for the Laplace J factor; of no use where an
-        eigenvalue is zero.
-    residual, closure : float
-        Largest entry of all equations, and of the closure equations alone.
-    iterations : int
-    seconds : float
-        Wall time of the solve.
-    status : Status
-    boundary : Ring, NickedRing, HingedRing, Loop or Pull
-    """
-
-    chain: Chain
-    angles: Array
-    multipliers: Array
-    energy: float
-    ring_link: int | None
-    twist: float
-    writhe: float
-    stable: bool | None
-    negative_eigenvalues: int
-    log_abs_det_kkt: float
-    residual: float
-    closure: float
-    iterations: int
-    seconds: float
-    status: Status
-    boundary: AnyBoundary = RING
-
-    @property
-    def link(self) -> int:
-        """Turns of the frames about the ring.
-
-        Raises
-        ------
-        InputError
-            The end is not that of a ring.
-        """
-        if self.ring_link is None:
-            raise InputError(f"a {self.boundary.label} chain has no link; ask a ring for it")
-        return self.ring_link
-
-    @property
-    def energy_RT(self) -> float:
-        """Elastic energy in RT."""
-        return self.energy * self.chain.energy_scale_RT
-
-    @cached_property
-    def parts(self) -> tuple[float, float]:
-        """Reduced bending and twisting parts of the energy."""
-        return energy_parts(self.chain, self.angles)
-
-    @property
-    def bend_RT(self) -> float:
-        """Bending part of the energy in RT."""
-        return self.parts[0] * self.chain.energy_scale_RT
-
-    @property
-    def twist_RT(self) -> float:
-        """Twisting part of the energy in RT."""
-        return self.parts[1] * self.chain.energy_scale_RT
-
-    @cached_property
-    def shape(self) -> tuple[Array, Array]:
-        """Centres (N+1, 3) in steps and frames (N+1, 3, 3), frame 0 at the origin."""
-        return chain_frames(self.angles, self.chain.step_form)
-
-    @property
-    def centres(self) -> Array:
-        """Base-pair centres (N+1, 3) in steps; the last coincides with the first."""
-        return self.shape[0]
-
-    @property
-    def frames(self) -> Array:
-        """Frames (N+1, 3, 3), directors in columns."""
-        return self.shape[1]
-
-    @cached_property
-    def smallest_eigenvalue(self) -> float:
-        """Smallest eigenvalue of the projected Hessian, reduced energy per square radian."""
-        return smallest_projected_eigenvalue(
-            self.chain, self.angles, self.multipliers, self.boundary.for_chain(self.chain)
-        )
-
-
 def _topology(
     chain: Chain, centres: Array, frames: Array, boundary: AnyBoundary
 ) -> tuple[int | None, float, float]:
@@ -216,8 +102,8 @@ def make_ring(
     code: int,
     seconds: float,
     boundary: AnyBoundary = RING,
-) -> DiscreteRing:
-    """Wrap what the compiled solver left into a :class:`DiscreteRing`."""
+) -> Equilibrium:
+    """Wrap what the compiled solver left into a :class:`Equilibrium`."""
     centres, frames = chain_frames(angles, chain.step_form)
     converged = code == nk.CONVERGED
     link, twist, writhe = _topology(chain, centres, frames, boundary)
@@ -234,19 +120,21 @@ def make_ring(
         status = Status.NEUTRAL
     angles.setflags(write=False)
     multipliers.setflags(write=False)
-    return DiscreteRing(
-        chain=chain,
-        angles=angles,
-        multipliers=multipliers,
+    return Equilibrium(
+        source=chain,
+        solution=Steps(
+            angles,
+            multipliers,
+            log_abs_det_kkt=float(figures[nk.LOG_DET_KKT]),
+            closure=float(figures[nk.CLOSURE]),
+        ),
         energy=energy,
         ring_link=link,
-        twist=twist,
+        twist_turns=twist,
         writhe=writhe,
         stable=negatives == 0 if converged and (negatives or not neutral) else None,
-        negative_eigenvalues=negatives,
-        log_abs_det_kkt=float(figures[nk.LOG_DET_KKT]),
+        negative_directions=negatives,
         residual=float(figures[nk.RESIDUAL]),
-        closure=float(figures[nk.CLOSURE]),
         iterations=int(figures[nk.ITERATIONS]),
         seconds=seconds,
         status=status,
@@ -261,7 +149,7 @@ def solve_ring(
     *,
     boundary: AnyBoundary = RING,
     throw: bool = True,
-) -> DiscreteRing:
+) -> Equilibrium:
     """Equilibrium of a chain, closed to a ring or held by another boundary, from a start.
 
     Parameters

@@ -93,7 +93,7 @@ def quaternions_along_the_rod(rng: np.random.Generator) -> HardCase:
     del rng
     chain = build_chain(embedded("09T15"))
     ring = lowest_continuum_ring(build_rod(chain)).lowest
-    neighbours = np.sum(ring.quaternions[1:] * ring.quaternions[:-1], axis=1)
+    neighbours = np.sum(ring.curve.quaternions[1:] * ring.curve.quaternions[:-1], axis=1)
     return hard_case(
         GROUP,
         "quaternion signs along a ring",
@@ -112,7 +112,7 @@ def straight_rod(rng: np.random.Generator) -> HardCase:
     chain = build_chain(parse_sequence("A" * 200, "A200"), a_tracts="none")
     rod = build_rod(chain)
     ring = lowest_continuum_ring(rod).lowest
-    alpha = ring.alpha
+    alpha = ring.curve.alpha
     exact = 0.5 * rod.bend_stiffness * (2.0 * np.pi) ** 2 + 0.5 * rod.twist_stiffness * alpha**2
     return hard_case(
         GROUP,

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from dnacheck.equilibria.discrete.search import RingSearch, SearchOptions, find_rings, search_minima
+from dnacheck.equilibria.discrete.search import SearchOptions, find_rings, search_minima
 from dnacheck.equilibria.discrete.solve import NewtonOptions
+from dnacheck.equilibria.ring import Equilibria
 from dnacheck.model.chain import Chain, build_chain, uniform_stiffness
 from dnacheck.model.molecules import embedded
 from dnacheck.model.sequence import Sequence, parse_sequence
@@ -25,14 +26,14 @@ def _random(rng: np.random.Generator, n: int) -> Sequence:
     return parse_sequence("".join(rng.choice(list("ACGT"), n)), f"random{n}")
 
 
-def _brute(chain: Chain, registers: int = 8) -> RingSearch:
+def _brute(chain: Chain, registers: int = 8) -> Equilibria:
     middle = round(chain.relaxed_turns)
     rolls = np.linspace(0.0, 2.0 * np.pi, registers, endpoint=False, dtype=np.float64)
     links = tuple(range(middle - 2, middle + 3))
     return search_minima(chain, links, rolls, math.inf, NewtonOptions())
 
 
-def _energy(search: RingSearch) -> float:
+def _energy(search: Equilibria) -> float:
     return search.lowest.energy_RT if search.equilibria else math.inf
 
 
@@ -302,8 +303,8 @@ def condition_numbers(rng: np.random.Generator) -> list[dict[str, Any]]:
         rows.append(
             {
                 "n": n,
-                "smallest": ring.smallest_eigenvalue,
-                "hessian": largest / ring.smallest_eigenvalue,
+                "smallest": ring.softest,
+                "hessian": largest / ring.softest,
                 "closure": float(np.linalg.cond(jacobian @ jacobian.T)),
             }
         )

@@ -12,7 +12,7 @@ from dnacheck.validate.report.record import Column, Figure, Table
 from dnacheck.validate.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from dnacheck.equilibria.discrete.solve import DiscreteRing
+    from dnacheck.equilibria.ring import Equilibrium
     from dnacheck.md.check import MdCheck
     from dnacheck.model.chain import Chain
 
@@ -136,7 +136,7 @@ def minimum(context: Context) -> Findings:
     return Findings(results, [table, *_shape(found, ring)])
 
 
-def _shape(found: MdCheck, ring: DiscreteRing) -> list[Figure]:
+def _shape(found: MdCheck, ring: Equilibrium) -> list[Figure]:
     """The nearest minimum from planar circles over the discrete ring, on principal axes."""
     import numpy as np
 

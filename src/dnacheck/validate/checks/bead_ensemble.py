@@ -16,7 +16,7 @@ from dnacheck.validate.report.record import Column, Figure, Table
 
 if TYPE_CHECKING:
     from dnacheck.cyclization.ensembles.metropolis import ClosedRingEnsemble
-    from dnacheck.equilibria.discrete.solve import DiscreteRing
+    from dnacheck.equilibria.ring import Equilibrium
     from dnacheck.md.ensemble import EnsembleOptions
     from dnacheck.md.ensemble_statistics import EnsembleStatistics
     from dnacheck.md.fluctuation import FluctuationProfile
@@ -41,7 +41,7 @@ class Motion:
     """A ring in thermal motion, by three methods."""
 
     chain: Chain
-    ring: DiscreteRing
+    ring: Equilibrium
     dynamics: EnsembleStatistics
     sampling: ClosedRingEnsemble
     ours: FluctuationProfile

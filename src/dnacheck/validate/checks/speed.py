@@ -16,7 +16,7 @@ from dnacheck.validate.reference.oracles import load_oracle, oracle_exists
 from dnacheck.validate.report.record import Column, Figure, Note, Table
 
 if TYPE_CHECKING:
-    from dnacheck.equilibria.continuum import ContinuumRing
+    from dnacheck.equilibria.ring import Equilibrium
     from dnacheck.model.chain import Chain
     from dnacheck.model.rod import Rod
 
@@ -113,7 +113,7 @@ def ring_energy(context: Context) -> Findings:
     return Findings(results, _blocks(chain, lines, notes))
 
 
-def continuum_reference(rod: Rod) -> tuple[ContinuumRing, float]:
+def continuum_reference(rod: Rod) -> tuple[Equilibrium, float]:
     """The finest continuum ring, and how far another fine mesh of another degree is from it."""
     from dnacheck.equilibria.continuum import (
         ContinuumOptions,
@@ -129,7 +129,7 @@ def continuum_reference(rod: Rod) -> tuple[ContinuumRing, float]:
     return ring, max(doubt, ROUNDING)
 
 
-def _coarse_doubt(rod: Rod, reference: ContinuumRing) -> float:
+def _coarse_doubt(rod: Rod, reference: Equilibrium) -> float:
     from dnacheck.equilibria.continuum import ContinuumOptions, solve_continuum_ring
 
     coarse = ContinuumOptions(intervals=20, degree=4, adapt=False)
@@ -137,7 +137,7 @@ def _coarse_doubt(rod: Rod, reference: ContinuumRing) -> float:
     return departure(ring.energy, reference.energy)
 
 
-def collocation_lines(rod: Rod, reference: ContinuumRing, floor: float) -> list[Line]:
+def collocation_lines(rod: Rod, reference: Equilibrium, floor: float) -> list[Line]:
     """Our collocation on uniform meshes, one line per degree."""
     from dnacheck.equilibria.continuum import ContinuumOptions, solve_continuum_ring
 
@@ -158,7 +158,7 @@ def collocation_lines(rod: Rod, reference: ContinuumRing, floor: float) -> list[
     return lines
 
 
-def adapted_line(rod: Rod, reference: ContinuumRing, floor: float) -> Line:
+def adapted_line(rod: Rod, reference: Equilibrium, floor: float) -> Line:
     """Our collocation with adapted mesh and error estimate."""
     from dnacheck.equilibria.continuum import ContinuumOptions, solve_continuum_ring
 
@@ -174,7 +174,7 @@ def adapted_line(rod: Rod, reference: ContinuumRing, floor: float) -> Line:
     return line
 
 
-def bvp_line(rod: Rod, reference: ContinuumRing, floor: float, tolerances: Sequence[float]) -> Line:
+def bvp_line(rod: Rod, reference: Equilibrium, floor: float, tolerances: Sequence[float]) -> Line:
     """scipy.integrate.solve_bvp on the paper's fourteen variables."""
     solve = load_oracle("scipy_bvp").solve
     line = Line("solve_bvp (scipy)")
@@ -189,7 +189,7 @@ def bvp_line(rod: Rod, reference: ContinuumRing, floor: float, tolerances: Seque
 
 
 def auto_line(
-    rod: Rod, reference: ContinuumRing, floor: float, intervals: Sequence[int]
+    rod: Rod, reference: Equilibrium, floor: float, intervals: Sequence[int]
 ) -> Line | str:
     """AUTO-07p, time per solution of its branch; or why there is none."""
     if not oracle_exists("auto07p"):
@@ -201,18 +201,18 @@ def auto_line(
     from dnacheck.equilibria.continuation.parameters import end_twist
     from dnacheck.equilibria.continuum.collocation import discretise
 
-    before = reference.alpha - _AUTO_BEFORE
-    disc = discretise(rod, reference.mesh, reference.degree)
-    start = ring_from(disc, end_twist(), before, reference.loads, reference.slopes)
+    before = reference.curve.alpha - _AUTO_BEFORE
+    disc = discretise(rod, reference.curve.mesh, reference.curve.degree)
+    start = ring_from(disc, end_twist(), before, reference.curve.loads, reference.curve.slopes)
     line = Line("AUTO-07p, degree 4")
     for count in intervals:
         grid = np.linspace(0.0, 1.0, 4 * count + 1)
         branch = auto.follow_twist(
-            rod, before, start.solution(grid), points=20, intervals=count, energy=True,
+            rod, before, start.curve.solution(grid), points=20, intervals=count, energy=True,
             first_step=_AUTO_BEFORE / 4.0, longest_step=_AUTO_BEFORE / 4.0, tolerance=1e-10,
-            most=reference.alpha,
+            most=reference.curve.alpha,
         )  # fmt: skip
-        if abs(branch.alpha[-1] - reference.alpha) > 1e-7:
+        if abs(branch.alpha[-1] - reference.curve.alpha) > 1e-7:
             return f"AUTO-07p: its branch ended at {branch.alpha[-1]:.6f}."
         error = departure(float(branch.energy[-1]), reference.energy)
         line.add(str(count), error, branch.seconds_per_point, max(floor, FINER * _AUTO_DIGITS))
@@ -257,7 +257,7 @@ def _finer(item: str, doubt: float, smallest: float) -> CheckResult:
     )
 
 
-def _promises(rod: Rod, reference: ContinuumRing) -> list[CheckResult]:
+def _promises(rod: Rod, reference: Equilibrium) -> list[CheckResult]:
     """Adapted meshes keep the tolerance that they were given."""
     from dnacheck.equilibria.continuum import ContinuumOptions, solve_continuum_ring
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from dnacheck.equilibria.continuum import ContinuumOptions, ContinuumRing, lowest_continuum_ring
-from dnacheck.equilibria.discrete.search import RingSearch, find_rings
-from dnacheck.equilibria.discrete.solve import DiscreteRing
+from dnacheck.equilibria.continuum import ContinuumOptions, lowest_continuum_ring
+from dnacheck.equilibria.discrete.search import find_rings
+from dnacheck.equilibria.ring import Equilibria, Equilibrium
 from dnacheck.model.a_tracts import Region
 from dnacheck.model.chain import Chain, build_chain
 from dnacheck.model.molecules import Molecule
@@ -57,12 +57,12 @@ def scene_chain(
     )
 
 
-_SEARCHES: dict[int, tuple[Chain, RingSearch]] = {}
+_SEARCHES: dict[int, tuple[Chain, Equilibria]] = {}
 _RODS: dict[tuple[int, RodOptions], tuple[Chain, Rod]] = {}
-_CONTINUA: dict[tuple[int, RodOptions], tuple[Chain, ContinuumRing]] = {}
+_CONTINUA: dict[tuple[int, RodOptions], tuple[Chain, Equilibrium]] = {}
 
 
-def rings(chain: Chain) -> RingSearch:
+def rings(chain: Chain) -> Equilibria:
     """Minima of the discrete chain, lowest first."""
     key = id(chain)
     if key not in _SEARCHES:
@@ -70,7 +70,7 @@ def rings(chain: Chain) -> RingSearch:
     return _SEARCHES[key][1]
 
 
-def lowest_ring(chain: Chain) -> DiscreteRing:
+def lowest_ring(chain: Chain) -> Equilibrium:
     """Lowest discrete ring; raises SolveError where none is found."""
     return rings(chain).lowest
 
@@ -94,7 +94,7 @@ def rod_of(chain: Chain, options: RodOptions) -> Rod:
     return _RODS[key][1]
 
 
-def lowest_continuum(chain: Chain, options: RodOptions) -> ContinuumRing:
+def lowest_continuum(chain: Chain, options: RodOptions) -> Equilibrium:
     """Lowest continuum ring, its energy converged to 1e-6."""
     key = (id(chain), options)
     if key not in _CONTINUA:

@@ -13,7 +13,7 @@ import numpy as np
 from dnacheck.cyclization.laplace.register import register_profile
 from dnacheck.cyclization.methods import ClosureSampling, HalfChain, Laplace, Umbrella
 from dnacheck.cyclization.result import JFactor
-from dnacheck.equilibria.discrete.search import RingSearch
+from dnacheck.equilibria.ring import Equilibria
 from dnacheck.numerics.outcome import SolveError
 
 APPROXIMATE = ("laplace", "register-laplace")
@@ -45,7 +45,7 @@ class CompareOptions:
 
 
 def compare_methods(
-    search: RingSearch, options: CompareOptions, seed: int = 0
+    search: Equilibria, options: CompareOptions, seed: int = 0
 ) -> dict[str, JFactor]:
     """J factors by method, each sampler with random numbers of its own.
 

@@ -150,7 +150,7 @@ def imperfect(context: Context) -> Findings:
                 "energy": ring.energy_RT,
                 "link": ring.link,
                 "writhe": ring.writhe,
-                "moment": ring.end_moment * chain.energy_scale_RT,
+                "moment": ring.curve.end_moment * chain.energy_scale_RT,
                 "discrete": discrete.energy_RT,
                 "gap": 100.0 * gap,
                 "continuum_stable": ring.stable,

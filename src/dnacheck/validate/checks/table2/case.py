@@ -11,8 +11,7 @@ from dnacheck.validate.reference.published import ENERGY_ROUNDING, PAPER, Publis
 
 if TYPE_CHECKING:
     from dnacheck.equilibria.bridge.reconstruct import Reconstruction
-    from dnacheck.equilibria.continuum import ContinuumRing
-    from dnacheck.equilibria.discrete.solve import DiscreteRing
+    from dnacheck.equilibria.ring import Equilibrium
     from dnacheck.model.chain import Chain
 
 DISCRETE_TOLERANCE = 5e-4
@@ -35,9 +34,9 @@ class Case:
         molecule = next(item for item in context.molecules if item.name == name)
         self.published: PublishedRing = table2()[name]
         self.chain: Chain = rings.scene_chain(context.scene, molecule, "trifonov2", 1.5)
-        self.discrete: DiscreteRing = rings.lowest_ring(self.chain)
+        self.discrete: Equilibrium = rings.lowest_ring(self.chain)
         self.options = rings.rod_options(context.scene)
-        self.continuum: ContinuumRing = rings.lowest_continuum(self.chain, self.options)
+        self.continuum: Equilibrium = rings.lowest_continuum(self.chain, self.options)
         self.base_pairs: Reconstruction = reconstruct(self.continuum, self.chain.step_form)
         self.gap = self.continuum.energy / self.discrete.energy - 1.0
         rise = self.chain.rise_A

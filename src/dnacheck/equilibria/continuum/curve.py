@@ -1,4 +1,4 @@
-"""A continuum ring: the solution of (4.9) with (4.11), and what follows from it."""
+"""The curve of a continuum rod: the solution of (4.9) with (4.11) as functions of arclength."""
 
 from __future__ import annotations
 
@@ -11,12 +11,11 @@ from dnacheck.equilibria.continuum.collocation import gauss_rule
 from dnacheck.equilibria.continuum.equations import B, directors
 from dnacheck.equilibria.continuum.kernels.interpolate import evaluate
 from dnacheck.model.rod.rod import Rod
-from dnacheck.numerics.outcome import Status
 
 Array = NDArray[np.float64]
 
 
-def evaluate_ring(
+def evaluate_curve(
     s: Array, mesh: Array, slopes: Array, quaternions: Array, centres: Array
 ) -> tuple[Array, Array, Array]:
     """Collocation polynomials at the points s; arrays as in ``kernels.interpolate.evaluate``.
@@ -39,74 +38,44 @@ def evaluate_ring(
 
 
 @dataclass(frozen=True)
-class ContinuumRing:
-    """Equilibrium of a continuum rod closed into a ring.
+class Curve:
+    """What solves a continuum rod: directors and centreline as functions of arclength.
 
     Attributes
     ----------
     rod : Rod
     alpha : float
         Angle from D1(0) to D1(1) of the end conditions (4.11), counted along the rod: the ring of
-        the wanted link has alpha = Omega(1) - Omega(0) + 2 pi link when it is nearly planar.
-    energy, bend, twist : float
-        Reduced energy (K_theta = 1) and its parts.
-    link : int
-        Linking number of the centreline with d1, from twist plus writhe.
-    writhe : float
-        link minus the twist of d1.
+        the requested link has alpha = Omega(1) - Omega(0) + 2 pi link when it is nearly planar.
+    bend, twist : float
+        Parts of the reduced energy (K_theta = 1).
     end_moment : float
         m3(0), the moment about d3 at the end, reduced energy.
     loads : ndarray, shape (6,)
         m(0) and the constant force n in laboratory axes, which are the directors at s = 0.
-    stable : bool or None
-        True when no conjugate point lies inside the rod (the second variation under closure is
-        positive); None where the count was not possible.
-    conjugate_points : int or None
-        Number of negative directions of the second variation under closure.
-    residual : float
-        Larger of the relative collocation residual and the closure defect.
     energy_error, shape_error : float or None
         Estimated errors of the energy and, in radians, of the frames, both taken from the mesh
         before the last and so pessimistic; None where no second mesh was solved.
-    iterations : int
-        Newton iterations altogether.
-    seconds : float
-        Wall-clock time of the solve.
     mesh : ndarray, shape (K + 1,)
     slopes : ndarray, shape (K, k, 3)
         Rates of the local Gibbs vector at the Gauss points, the solver's own unknowns.
     quaternions : ndarray, shape (K + 1, 4)
     centres : ndarray, shape (K + 1, 3)
         Natural frame (4.8) and position at the mesh points; lengths in units of the rod's.
-    status : Status
     """
 
     rod: Rod
     alpha: float
-    energy: float
     bend: float
     twist: float
-    link: int
-    writhe: float
     end_moment: float
     loads: Array
-    stable: bool | None
-    conjugate_points: int | None
-    residual: float
     energy_error: float | None
     shape_error: float | None
-    iterations: int
-    seconds: float
     mesh: Array
     slopes: Array
     quaternions: Array
     centres: Array
-    status: Status
-
-    @property
-    def energy_RT(self) -> float:
-        """Energy in RT."""
-        return self.energy * self.rod.energy_scale_RT
 
     @property
     def intervals(self) -> int:
@@ -120,7 +89,7 @@ class ContinuumRing:
 
     def _evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
         s = np.ascontiguousarray(np.atleast_1d(np.asarray(s, dtype=float)))
-        return evaluate_ring(s, self.mesh, self.slopes, self.quaternions, self.centres)
+        return evaluate_curve(s, self.mesh, self.slopes, self.quaternions, self.centres)
 
     def centreline(self, s: ArrayLike) -> Array:
         """r(s), shape (m, 3), in units of the rod's length."""
