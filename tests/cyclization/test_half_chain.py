@@ -10,16 +10,15 @@ from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 from short_chains import closed_ground_chain, end_poses, exact_free_angles, soft_chain
 
-from dnacheck.cyclization.half_chain.kernels.pairs import half_poses, log_volume_factor
+from dnacheck.cyclization.half_chain.kernels.pairs import Halves, half_poses, log_volume_factor
 from dnacheck.cyclization.half_chain.proposals import ring_tilts
 from dnacheck.cyclization.half_chain.sampling import (
     HalfChainOptions,
-    _Grid,
-    _Halves,
-    _matched,
-    _Sampler,
+    HalfSampler,
     half_chain,
     half_chain_estimate,
+    matched,
+    sorted_into_cells,
 )
 from dnacheck.cyclization.half_chain.window import crossed_error, polynomial_weights
 from dnacheck.cyclization.result import PER_CUBIC_ANGSTROM_IN_MOLAR, JStatus
@@ -35,19 +34,15 @@ CLOSURE_SAMPLING = {"09T15": (15.531, 0.010), "08T15": (15.762, 0.011)}
 
 def drawn_poses(chain: Chain, angles: np.ndarray, backward: bool) -> np.ndarray:
     n = angles.shape[1]
-    poses, scores = np.empty((len(angles), 7)), np.empty((len(angles), 1))
+    poses = np.empty((len(angles), 7))
     half_poses(
         angles - chain.ground[:n],
         np.tile(np.eye(3), (n, 1, 1)),
         chain.ground[:n],
         chain.ground[:n],
-        np.zeros((1, n, 3)),
-        np.zeros(1),
         0,
         backward,
-        poses[:, :3],
-        poses[:, 3:],
-        scores,
+        poses,
     )
     return poses
 
@@ -104,7 +99,7 @@ def brute_force(first, second, tilts, radius):
     total = 0.0
     for i, j in itertools.product(range(len(first.poses)), range(len(second.poses))):
         shares = np.log([tilt.share for tilt in tilts])
-        own = tilts[int(np.argmax(shares + second.scores[j]))].at_joint
+        own = tilts[int(np.argmax(shares + second.scores[j]))].window
         both = tilts[int(np.argmax(shares + first.scores[i] + second.scores[j]))].at_joint
         back = Rotation.from_quat(second.poses[j, 3:]).inv()
         c = np.concatenate(
@@ -113,7 +108,7 @@ def brute_force(first, second, tilts, radius):
                 (back * Rotation.from_quat(first.poses[i, 3:])).as_rotvec(),
             ]
         )
-        if c @ np.linalg.solve(own.spread, c) >= radius**2:
+        if c @ np.linalg.solve(own, c) >= radius**2:
             continue
         w = np.linalg.norm(c[3:])
         measure = 2.0 * (1.0 - math.cos(w)) / w**2 / (8.0 * math.pi**2)
@@ -123,7 +118,7 @@ def brute_force(first, second, tilts, radius):
             - both.multipliers @ c
             + 0.5 * c @ both.curvature @ c
         )
-        total += weight / (measure * math.sqrt(np.linalg.det(own.spread)))
+        total += weight / (measure * math.sqrt(np.linalg.det(own)))
     return total
 
 
@@ -133,15 +128,13 @@ def test_matching_finds_every_pair_once(tilted):
     search = find_rings(chain)
     tilts = ring_tilts(search, 15)
     rng = np.random.default_rng(5)
-    sides = [_Sampler(chain, tilts, s, tilted) for s in (slice(0, 15), slice(15, 30))]
+    sides = [HalfSampler(chain, tilts, s, tilted) for s in (slice(0, 15), slice(15, 30))]
     first, second = (side.draw(60, rng) for side in sides)
     options = HalfChainOptions(halves=80, batches=4, radius=1.3, tilted=tilted)
-    reach = 1.3 * max(math.sqrt(np.linalg.eigvalsh(t.at_joint.spread[:3, :3])[-1]) for t in tilts)
-    grid = _Grid(first, np.repeat(np.arange(4), 15), reach)
-    parts = [
-        _Halves(second.poses[k::4], second.log_weights[k::4], second.scores[k::4]) for k in range(4)
-    ]
-    sums = _matched(grid, parts, tilts, options)
+    reach = 1.3 * max(math.sqrt(np.linalg.eigvalsh(t.window[:3, :3])[-1]) for t in tilts)
+    in_cells, cells = sorted_into_cells(first, np.repeat(np.arange(4), 15), reach)
+    parts = [Halves(*(np.ascontiguousarray(array[k::4]) for array in second)) for k in range(4)]
+    sums = matched(in_cells, cells, parts, tilts, options)
     expected = brute_force(first, second, tilts, 1.3)
     assert sums.counts.sum() > 8
     assert sums.table.sum() == pytest.approx(expected, rel=1e-9)
@@ -153,7 +146,7 @@ def test_mixture_weights_average_to_one_only_with_the_mixture_density():
     chain = molecule_chain("09T15")
     tilts = ring_tilts(find_rings(chain), 78)
     # Ten steps, so that tilted and free chains overlap and the mean converges.
-    sampler = _Sampler(chain, tilts, slice(0, 10), True)
+    sampler = HalfSampler(chain, tilts, slice(0, 10), True)
     halves = sampler.draw(40_000, np.random.default_rng(2))
     weights = np.exp(halves.log_weights)
     error = weights.std() / math.sqrt(len(weights))

@@ -1,29 +1,42 @@
 """The cheapest method whose measured error meets a tolerance.
 
-The order is that of cost: Laplace, register-integrated Laplace, exact-closure sampling, tilted
-half chains. Laplace's error is not guessed: a small sample of exactly closed shapes measures it.
+The order is that of cost: Laplace, register-integrated Laplace, its first anharmonic term,
+exact-closure sampling, half chains. Laplace's error is not guessed: a small sample of exactly
+closed shapes measures it. The same sample says how many draws the tolerance takes, hence whether
+the anharmonic term may be had for less, and whether the Gaussian about the minima is a picture of
+the closed shapes at all; where it is not, and where closing costs so little that no minimum is,
+half chains come first.
 """
 
 from __future__ import annotations
 
 import contextlib
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from dnacheck.cyclization.closure.method import ClosureSampling
 from dnacheck.cyclization.half_chain.method import HalfChain
-from dnacheck.cyclization.method import Method, Run, register_profile_of
+from dnacheck.cyclization.method import Method, Run, register_profile_of, rings_of
 from dnacheck.cyclization.result import Attempt, JFactor, JStatus
 from dnacheck.numerics.outcome import SolveError
 
 if TYPE_CHECKING:
+    from numpy.random import SeedSequence
+
+    from dnacheck.cyclization.laplace.register import RegisterProfile
     from dnacheck.cyclization.method import Target
+    from dnacheck.equilibria.ring import Equilibria
 
 _PILOT_BATCHES = 8
 _PILOT_SIGMAS = 2.4
 """Standard errors of a pilot of eight batches that hold the true value 95 % of the time (Student's
 t with seven degrees of freedom)."""
+_TERM_PAIRS = 100
+_DRAWS_A_PAIR = 4
+"""Closed shapes that a pair of the anharmonic term takes: both signs at two scales."""
+_DISTRUSTED = (JStatus.HEAVY_TAILS, JStatus.FOLDED)
 
 
 @dataclass(frozen=True)
@@ -35,79 +48,109 @@ class Auto(Method):
         return "auto"
 
     def run(self, target: Target, run: Run) -> JFactor:
-        from dnacheck.cyclization.laplace.isolated import laplace
-        from dnacheck.cyclization.laplace.register import register_laplace
         from dnacheck.numerics.seeds import seed_sequence
 
-        began = time.perf_counter()
-        profile = register_profile_of(target)
-        search = profile.search
-        seeds = seed_sequence(run.rng).spawn(3)
-        attempts: list[Attempt] = []
+        search = rings_of(target)
         results: list[JFactor] = []
-        left = max(1e-3, run.max_seconds - (time.perf_counter() - began))
-        sampling = replace(run, max_seconds=left)
-        pilot = None
-        with contextlib.suppress(SolveError):
-            brief = ClosureSampling(first_batches=_PILOT_BATCHES, most_draws=1)
-            pilot = brief.run(profile, replace(sampling, rng=seeds[0], progress=None))
-        if pilot is not None:
-            values = [register_laplace(profile)]
-            with contextlib.suppress(SolveError):  # a free register has no Laplace value
-                values.insert(0, laplace(search))
-            for value in values:
-                measured, attempt = _laplace_attempt(value, pilot, run.tolerance)
-                attempts.append(attempt)
-                results.append(measured)
-                if attempt.met:
-                    return _chosen(measured, attempts, run.tolerance)
-            sampled = ClosureSampling().run(profile, replace(sampling, rng=seeds[1]))
-            met = sampled.total_error <= run.tolerance and sampled.status is JStatus.CONVERGED
-            attempts.append(_attempt(sampled, met))
+        attempts: list[Attempt] = []
+        for result in _results(target, search, run, seed_sequence(run.rng).spawn(4)):
+            met = result.total_error <= run.tolerance and result.status is JStatus.CONVERGED
+            error = result.total_error
+            attempts.append(Attempt(result.method, result.minus_lnJ, error, result.seconds, met))
             if met:
-                return _chosen(sampled, attempts, run.tolerance)
-            # A result that knows its error outranks a Laplace value whatever the two errors are.
-            results = [sampled]
-        left = began + run.max_seconds - time.perf_counter()
-        halves = None
-        if left > 0.0 and search.equilibria:
-            # Too few pairs that meet are no reason to give up what closure sampling found.
-            with contextlib.suppress(SolveError):
-                rest = replace(run, rng=seeds[2], max_seconds=left, progress=None)
-                halves = HalfChain().run(search, rest)
-        if halves is not None:
-            met = halves.total_error <= run.tolerance and halves.status is not JStatus.HEAVY_TAILS
-            attempts.append(_attempt(halves, met))
-            if met:
-                return _chosen(halves, attempts, run.tolerance)
-            results.append(halves)
+                return _chosen(result, attempts, run.tolerance)
+            results.append(result)
+        # A result that knows its error outranks a Laplace value whatever the two errors are.
+        results = [r for r in results if r.samples and r.method != "corrected-laplace"] or results
         if not results:
             raise SolveError(
-                f"J factor of {profile.chain.name}: no draw could be closed, and no isolated "
+                f"J factor of {search.chain.name}: no draw could be closed, and no isolated "
                 "minimum for half chains; use --method register-laplace"
             )
-        best = min(results, key=lambda r: (r.status is JStatus.HEAVY_TAILS, r.total_error))
-        if best.status is not JStatus.HEAVY_TAILS:
+        best = min(results, key=lambda r: (r.status in _DISTRUSTED, r.total_error))
+        if best.status not in _DISTRUSTED:
             best = replace(best, status=JStatus.TOLERANCE_NOT_MET)
         reason = (
-            f"no method met {run.tolerance:g}; {best.method} has the smallest error, "
-            f"{best.total_error:.2g} ({_tried(attempts)})"
+            f"no method met {run.tolerance:g}; {best.method} has the smallest error of those "
+            f"whose diagnosis is good, {best.total_error:.2g} ({_tried(attempts)})"
         )
         return replace(best, reason=reason, tried=tuple(attempts))
 
 
-def _attempt(result: JFactor, met: bool) -> Attempt:
-    return Attempt(result.method, result.minus_lnJ, result.total_error, result.seconds, met)
+def _results(
+    target: Target, search: Equilibria, run: Run, seeds: list[SeedSequence]
+) -> Iterator[JFactor]:
+    """Results in the order in which methods are tried; made only when they are asked for."""
+    from dnacheck.cyclization.half_chain.proposals import closing_is_easy
+
+    began = time.perf_counter()
+
+    def left(seed: SeedSequence, least: float = 0.0) -> Run | None:
+        seconds = max(began + run.max_seconds - time.perf_counter(), least)
+        return replace(run, rng=seed, max_seconds=seconds) if seconds > 0.0 else None
+
+    def halves() -> Iterator[JFactor]:
+        allowed = left(seeds[2])
+        if allowed is not None and search.equilibria:
+            # Too few pairs that meet are no reason to give up what another method found.
+            with contextlib.suppress(SolveError):
+                yield HalfChain().run(search, replace(allowed, progress=None))
+
+    if closing_is_easy(search):
+        yield from halves()
+        return
+    profile = register_profile_of(target if target is not search.chain else search)
+    first = left(seeds[0], least=1e-3)
+    assert first is not None
+    pilot = None
+    with contextlib.suppress(SolveError):
+        brief = ClosureSampling(first_batches=_PILOT_BATCHES, most_draws=1)
+        pilot = brief.run(profile, replace(first, progress=None))
+    if pilot is None:
+        yield from halves()
+        return
+    if pilot.status in _DISTRUSTED:
+        yield from halves()
+    else:
+        yield from _laplace_values(profile, search, pilot, run.tolerance)
+        yield from _corrected(profile, pilot, replace(run, rng=seeds[3]))
+    sampling = left(seeds[1], least=1e-3)
+    assert sampling is not None
+    yield ClosureSampling().run(profile, sampling)
+    if pilot.status not in _DISTRUSTED:
+        yield from halves()
 
 
-def _laplace_attempt(value: JFactor, pilot: JFactor, tolerance: float) -> tuple[JFactor, Attempt]:
-    """A Laplace value with its error measured by the pilot."""
-    bias = abs(value.minus_lnJ - pilot.minus_lnJ) + _PILOT_SIGMAS * pilot.stderr
-    bias += pilot.bias_bound or 0.0
-    met = bias <= tolerance
-    status = JStatus.CONVERGED if met else value.status
-    measured = replace(value, bias_bound=bias, status=status)
-    return measured, _attempt(measured, met)
+def _laplace_values(
+    profile: RegisterProfile, search: Equilibria, pilot: JFactor, tolerance: float
+) -> Iterator[JFactor]:
+    """Laplace's values with their errors measured by the pilot."""
+    from dnacheck.cyclization.laplace.isolated import laplace
+    from dnacheck.cyclization.laplace.register import register_laplace
+
+    values = [register_laplace(profile)]
+    with contextlib.suppress(SolveError):  # a free register has no Laplace value
+        values.insert(0, laplace(search))
+    for value in values:
+        bias = abs(value.minus_lnJ - pilot.minus_lnJ) + _PILOT_SIGMAS * pilot.stderr
+        bias += pilot.bias_bound or 0.0
+        status = JStatus.CONVERGED if bias <= tolerance else value.status
+        yield replace(value, bias_bound=bias, status=status)
+
+
+def _corrected(profile: RegisterProfile, pilot: JFactor, run: Run) -> Iterator[JFactor]:
+    """The first anharmonic term, for no more closed shapes than sampling would take."""
+    from dnacheck.cyclization.laplace.anharmonic import AnharmonicOptions, corrected_laplace
+
+    draws = pilot.samples * (pilot.stderr / run.tolerance) ** 2
+    pairs = int(min(draws, 1e6) / _DRAWS_A_PAIR)
+    if pairs < _TERM_PAIRS:
+        return
+    options = AnharmonicOptions(0.7 * run.tolerance, first_pairs=_TERM_PAIRS, most_pairs=pairs)
+    with contextlib.suppress(SolveError):
+        result = corrected_laplace(profile, options, run.rng)
+        met = result.total_error <= run.tolerance
+        yield replace(result, status=JStatus.CONVERGED) if met else result
 
 
 def _tried(attempts: list[Attempt]) -> str:

@@ -31,6 +31,10 @@ class JStatus(enum.Enum):
         "a few samples carry the mean, so the standard error may be too small; use more samples "
         "or another method"
     )
+    FOLDED = (
+        "many draws fold away from closure, so shapes far from every minimum may be missed; use "
+        "half chains"
+    )
     SOFT_REGISTER = (
         "the register is nearly free, so the Laplace value is unreliable; use the "
         "register-integrated one or sample"

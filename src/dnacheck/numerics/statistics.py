@@ -47,6 +47,18 @@ class WeightSummary:
         """Whether the tail forbids to trust the standard error."""
         return self.pareto_shape is not None and self.pareto_shape > HEAVY_PARETO_SHAPE
 
+    @property
+    def unseen(self) -> float:
+        """Expected part of the mean that lies in the tail beyond the largest weight drawn.
+
+        About one draw in as many as were made exceeds the largest, and a tail of shape k is then
+        larger by 1 / (1 - k) on average. Counted where the variance is in doubt, k > 1/2; infinite
+        where the mean is, k >= 1.
+        """
+        if self.pareto_shape is None or self.pareto_shape <= 0.5:
+            return 0.0
+        return self.largest_share / (1.0 - self.pareto_shape) if self.pareto_shape < 1 else math.inf
+
 
 def checked_log_weights(log_weights: ArrayLike) -> Array:
     """Log-weights as an array; -inf (a weight of zero) is allowed.

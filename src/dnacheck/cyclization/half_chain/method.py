@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 _FIRST_HALVES = 4_000
 _MOST_HALVES = 256_000
+_LEAST_RADIUS = 0.15
+_BIAS_POWER = 4
+"""What is left of the window's bias grows with this power of its radius."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +30,7 @@ class HalfChain(Method):
     ----------
     halves : int or None
         First halves drawn, and as many second halves; None for growing numbers, 4,000 to
-        256,000, until the tolerance or the time is reached.
+        256,000, and windows as small as the bias asks, until the tolerance or the time is reached.
     tilted : bool
         Draw about closed shapes; otherwise from the free chain.
     batches : int
@@ -51,7 +54,7 @@ class HalfChain(Method):
     def name(self) -> str:
         return "half-chain" if self.tilted else "half-chain-plain"
 
-    def options(self, run: Run, halves: int) -> HalfChainOptions:
+    def options(self, run: Run, halves: int, radius: float | None = None) -> HalfChainOptions:
         """These options for so many halves on either side."""
         from dnacheck.cyclization.half_chain.sampling import HalfChainOptions
 
@@ -59,7 +62,7 @@ class HalfChain(Method):
             halves=halves,
             batches=self.batches,
             tilted=self.tilted,
-            radius=self.radius,
+            radius=self.radius if radius is None else radius,
             shells=self.shells,
             threads=run.threads,
         )
@@ -77,35 +80,42 @@ class HalfChain(Method):
         return result
 
     def _to_tolerance(self, search: Equilibria, run: Run) -> JFactor:
-        """Halves in growing numbers until the tolerance, the time or the most halves."""
-        from dnacheck.cyclization.half_chain.sampling import half_chain
+        """Halves in growing numbers and windows that shrink, until the tolerance or the time."""
+        from dnacheck.cyclization.half_chain.sampling import half_chain_estimate, half_chain_result
         from dnacheck.cyclization.result import JStatus
         from dnacheck.numerics.seeds import generator, seed_sequence
 
         sequence = seed_sequence(run.rng)
         deadline = time.perf_counter() + run.max_seconds
-        halves, drawn = _FIRST_HALVES, 0
+        halves, radius, drawn = _FIRST_HALVES, self.radius, 0
         best: JFactor | None = None
         while True:
             began = time.perf_counter()
-            rng = generator(sequence.spawn(1)[0])
-            options = self.options(run, halves)
-            failure = None
+            options = self.options(run, halves, radius)
+            failure, smaller = None, radius
             try:
-                result = half_chain(search, options, rng)
+                estimate = half_chain_estimate(search, options, generator(sequence.spawn(1)[0]))
+                seconds = time.perf_counter() - began
+                result = half_chain_result(search.chain, options, estimate, seconds)
             except SolveError as error:  # more halves may do
                 failure = error
             else:
                 if best is None or result.total_error < best.total_error:
                     best = result
+                bias = abs(estimate.bias)
+                if bias > max(0.5 * run.tolerance, 3.0 * estimate.bias_stderr):
+                    shrink = (0.25 * run.tolerance / bias) ** (1.0 / _BIAS_POWER)
+                    smaller = max(_LEAST_RADIUS, radius * max(shrink, 0.5))
             drawn += 2 * options.halves
             if run.progress is not None:
                 run.progress(drawn)
             now = time.perf_counter()
-            halves *= 4
             met = best is not None and best.total_error <= run.tolerance
+            # A smaller window holds fewer of the pairs; twice the halves make up for a part.
+            growth = 2 if smaller < radius else 4
+            halves, radius = growth * halves, smaller
             # Four times the halves make up to sixteen times the pairs.
-            if met or halves > _MOST_HALVES or now + 4.0 * (now - began) > deadline:
+            if met or halves > _MOST_HALVES or now + growth * (now - began) > deadline:
                 break
         if best is None:
             assert failure is not None

@@ -44,6 +44,12 @@ _MOST_PER_SIDE = 24
 _CURVATURE_LIMIT = 6.0
 """Bound on the curvature of ln J in the mismatch, in its own standard deviations; a zero mode
 makes it infinite, and the window is far smaller than one standard deviation."""
+_EASY_RT = 3.0
+"""Energy of the lowest ring below which the free chain meets often enough by itself. Shapes of such
+long molecules are far from any minimum, and a mixture about minima would give heavy tails."""
+_WIDEST_TURN = 1.5
+_WIDEST_MOVE = 0.25
+"""Semi-axes of the largest unit window: radians, and a fraction of the contour length."""
 _POWER_STEPS = 40
 _PROJECTIONS = 12
 _CLOSED = 1e-11
@@ -88,6 +94,8 @@ class Tilt:
         Fraction of the draws.
     at_joint : Linearisation
         Closure of the chain cut between its two halves, in the frame of the joint.
+    window : ndarray, shape (6, 6)
+        Covariance whose ellipsoids are the windows of pairs that meet, see :func:`window_shape`.
     """
 
     angles: Array
@@ -96,6 +104,7 @@ class Tilt:
     link: int
     share: float
     at_joint: Linearisation
+    window: Array
 
 
 def rolled(chain: Chain, angles: Array, joint: int) -> tuple[Array, Array, Array]:
@@ -237,10 +246,35 @@ def centre_shapes(search: Equilibria) -> list[tuple[Array, Array, int]]:
     return [shape for shape in shapes if _energy_RT(chain, shape[0])[0] < lowest + _WINDOW_RT]
 
 
+def closing_is_easy(search: Equilibria) -> bool:
+    """Whether halves are drawn from the free chain, because closing it costs little."""
+    energies = [ring.energy_RT for ring in search.equilibria if ring.stable is not False]
+    return min(energies, default=np.inf) < _EASY_RT
+
+
+def window_shape(chain: Chain, spread: Array) -> Array:
+    """Covariance (6, 6) of the mismatch that windows follow, cut where linear closure ends.
+
+    The mismatch of chains about a closed shape to first order, ``spread``, grows beyond a turn and
+    the contour length in long chains, where it says nothing of how the density of closure varies.
+    It is cut in each principal direction at 1.5 rad and, for displacements, a quarter of the
+    contour or the spread of a free chain's end, whichever is less.
+    """
+    flexibility = np.linalg.inv(chain.energy_scale_RT * chain.stiffness)
+    bends = float(flexibility[:, 1, 1].mean() + flexibility[:, 2, 2].mean())
+    free_end = np.sqrt(4.0 * chain.n_steps / (3.0 * bends))
+    move = min(_WIDEST_MOVE * chain.n_steps, free_end)
+    scale = np.array([move] * 3 + [_WIDEST_TURN] * 3)
+    values, vectors = np.linalg.eigh(spread / np.outer(scale, scale))
+    cut: Array = (vectors * np.minimum(values, 1.0)) @ vectors.T * np.outer(scale, scale)
+    return cut
+
+
 def ring_tilts(search: Equilibria, joint: int) -> tuple[Tilt, ...]:
     """Tilts that cover the stable minima of a search, for halves that meet at base pair ``joint``.
 
-    Shares fall with half the energy, so that higher shapes are still sampled.
+    Shares fall with half the energy, so that higher shapes are still sampled. Where closing costs
+    little (:func:`closing_is_easy`) the minima alone serve, to shape the windows.
 
     Raises
     ------
@@ -252,7 +286,7 @@ def ring_tilts(search: Equilibria, joint: int) -> tuple[Tilt, ...]:
     lowest = min(_energy_RT(chain, shape[0])[0] for shape in shapes)
     known: list[Array] = [np.array(shape[0]) for shape in shapes]
     links = [shape[2] for shape in shapes]
-    for angles, multipliers, link in shapes:
+    for angles, multipliers, link in [] if closing_is_easy(search) else shapes:
         way, ratio = softest_direction(chain, angles, multipliers)
         if not abs(ratio) < _SOFT_RATIO:
             continue
@@ -262,7 +296,7 @@ def ring_tilts(search: Equilibria, joint: int) -> tuple[Tilt, ...]:
     energies, pulls = zip(*(_energy_RT(chain, q) for q in known), strict=True)
     log_shares = -0.5 * (np.array(energies) - lowest)
     shares = np.exp(log_shares) / np.exp(log_shares).sum()
-    return tuple(
-        Tilt(q, pull, energy, link, float(share), linearised_closure(chain, q, joint))
-        for q, pull, energy, link, share in zip(known, pulls, energies, links, shares, strict=True)
-    )
+    closures = [linearised_closure(chain, q, joint) for q in known]
+    windows = [window_shape(chain, closure.spread) for closure in closures]
+    columns = (known, pulls, energies, links, map(float, shares), closures, windows)
+    return tuple(Tilt(*row) for row in zip(*columns, strict=True))

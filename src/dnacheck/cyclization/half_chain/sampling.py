@@ -15,7 +15,7 @@ A window of finite size has a bias. It is taken away in three steps: each pair i
 exp(-m.c + c.S.c / 2), the inverse of how the density varies with the mismatch c to second order;
 what is left is even in c, and is extrapolated to windows of zero size with a straight line in the
 square of the window's radius, fitted to shells of the same samples; a parabola in place of the
-line bounds the rest.
+line bounds the rest, and is reported itself where the two differ by more than chance.
 """
 
 from __future__ import annotations
@@ -29,8 +29,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dnacheck.cyclization.half_chain.kernels.pairs import fill_cells, half_poses, match_pairs, weigh
-from dnacheck.cyclization.half_chain.proposals import Tilt, ring_tilts
+from dnacheck.cyclization.half_chain.kernels.pairs import (
+    Cells,
+    Halves,
+    PairTotals,
+    Window,
+    fill_cells,
+    half_poses,
+    match_pairs,
+    weigh,
+)
+from dnacheck.cyclization.half_chain.proposals import Tilt, closing_is_easy, ring_tilts
 from dnacheck.cyclization.half_chain.window import HalfChainEstimate, PairSums, window_estimate
 from dnacheck.cyclization.result import JFactor, JStatus
 from dnacheck.equilibria.discrete.search import find_rings
@@ -43,6 +52,8 @@ from dnacheck.numerics.statistics import HEAVY_PARETO_SHAPE
 Array = NDArray[np.float64]
 
 _MOST_CELLS = 2_000_000
+_DRAWN_TOGETHER = 4_000_000
+"""Normal numbers made at once, which bounds the memory of long chains."""
 _LARGEST_SHARE = 0.1
 """One half that carries more than this fraction of J is reported as a heavy tail."""
 
@@ -59,7 +70,8 @@ class HalfChainOptions:
         Independent sets that they are drawn in; all pairs of sets are matched, and the standard
         error comes from how the pairs of sets differ.
     tilted : bool
-        Draw from the mixture of tilts; otherwise from the free chain.
+        Draw from the mixture of tilts, unless closing costs so little that the free chain meets
+        often enough; otherwise from the free chain.
     radius : float
         Largest mismatch of a pair, in standard deviations of the mismatch of tilted chains
         (about 25 steps and 1 rad each for 150 base pairs, correlated).
@@ -94,25 +106,12 @@ class HalfChainOptions:
             raise InputError("window radii are fractions in (0, 1]")
 
 
-@dataclass(frozen=True)
-class _Halves:
-    poses: Array  # (M, 7), position in steps and quaternion
-    log_weights: Array  # (M,)
-    scores: Array  # (M, K)
-
-    @staticmethod
-    def joined(parts: list[_Halves]) -> _Halves:
-        return _Halves(
-            np.concatenate([part.poses for part in parts]),
-            np.concatenate([part.log_weights for part in parts]),
-            np.concatenate([part.scores for part in parts]),
-        )
-
-    def taken(self, order: NDArray[np.int64]) -> _Halves:
-        return _Halves(self.poses[order], self.log_weights[order], self.scores[order])
+def joined(parts: list[Halves]) -> Halves:
+    """All halves of one side."""
+    return Halves(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 
-class _Sampler:
+class HalfSampler:
     """Draws the halves of one side of the joint."""
 
     def __init__(self, chain: Chain, tilts: tuple[Tilt, ...], steps: slice, tilted: bool) -> None:
@@ -139,31 +138,28 @@ class _Sampler:
             counts[np.argmax(counts)] += missing
         return counts
 
-    def draw(self, total: int, rng: np.random.Generator) -> _Halves:
+    def draw(self, total: int, rng: np.random.Generator) -> Halves:
         counts = self.counts(total) if self.tilted else np.array([total])
         centres = self.centres if self.tilted else [self.ground]
         poses = np.empty((total, 7))
         scores, log_weights = np.empty((total, len(self.shares))), np.zeros(total)
         done = 0
+        n, d = self.ground.shape
+        most = max(1, _DRAWN_TOGETHER // (n * d))
+        pulls = self.pulls.reshape(len(self.shares), n * d).T
         for centre, count in zip(centres, counts, strict=True):
-            part = slice(done, done + count)
-            half_poses(
-                rng.standard_normal((count, *self.ground.shape)),
-                self.roots,
-                centre,
-                self.ground,
-                self.pulls,
-                self.energies,
-                self.form,
-                self.backward,
-                poses[part, :3],
-                poses[part, 3:],
-                scores[part],
-            )
-            done += count
+            last = done + count
+            while done < last:
+                part = slice(done, min(done + most, last))
+                strains = rng.standard_normal((part.stop - done, n, d))
+                half_poses(
+                    strains, self.roots, centre, self.ground, self.form, self.backward, poses[part]
+                )
+                scores[part] = strains.reshape(-1, n * d) @ pulls - self.energies
+                done = part.stop
         if self.tilted:
             weigh(scores, np.log(counts / total), log_weights)
-        return _Halves(poses, log_weights, scores)
+        return Halves(poses, log_weights, scores)
 
 
 def _map(work: Callable[[int], object], count: int, threads: int) -> list[object]:
@@ -173,78 +169,71 @@ def _map(work: Callable[[int], object], count: int, threads: int) -> list[object
         return list(pool.map(work, range(count)))
 
 
-class _Grid:
-    """First halves sorted into cells of space and, within a cell, by one part of the rotation."""
+def sorted_into_cells(
+    halves: Halves, batches: NDArray[np.int64], reach: float
+) -> tuple[Halves, Cells]:
+    """Halves sorted into cells of space and, within a cell, by one part of the rotation."""
+    positions = halves.poses[:, :3]
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    size = 0.5 * reach
+    while np.prod(np.floor((high - low) / size) + 1.0) > _MOST_CELLS:
+        size *= 1.25
+    shape = (np.floor((high - low) / size) + 1.0).astype(np.int64)
+    cells = np.empty(len(positions), np.int64)
+    fill_cells(positions, low, size, shape, cells)
+    order = np.lexsort((np.abs(halves.poses[:, 3]), cells))
+    starts = np.searchsorted(cells[order], np.arange(int(np.prod(shape)) + 1))
+    taken = Halves(*(array[order] for array in halves))
+    return taken, Cells(starts, low, float(size), shape, batches[order])
 
-    def __init__(self, halves: _Halves, batches: NDArray[np.int64], reach: float) -> None:
-        positions = halves.poses[:, :3]
-        low, high = positions.min(axis=0), positions.max(axis=0)
-        size = 0.5 * reach
-        while np.prod(np.floor((high - low) / size) + 1.0) > _MOST_CELLS:
-            size *= 1.25
-        self.low, self.size = low, size
-        self.shape = (np.floor((high - low) / size) + 1.0).astype(np.int64)
-        cells = np.empty(len(positions), np.int64)
-        fill_cells(positions, low, size, self.shape, cells)
-        order = np.lexsort((np.abs(halves.poses[:, 3]), cells))
-        self.halves = halves.taken(order)
-        self.batches = batches[order]
-        self.starts = np.searchsorted(cells[order], np.arange(int(np.prod(self.shape)) + 1))
 
-
-def _matched(
-    grid: _Grid, second: list[_Halves], tilts: tuple[Tilt, ...], options: HalfChainOptions
-) -> PairSums:
+def window_of(tilts: tuple[Tilt, ...], radius: float) -> Window:
+    """The window of every tilt, as compiled loops read it."""
     links = sorted({tilt.link for tilt in tilts})
-    roots = np.array([np.linalg.cholesky(tilt.at_joint.spread) for tilt in tilts])
-    spreads = np.array([tilt.at_joint.spread for tilt in tilts])
+    spreads = np.array([tilt.window for tilt in tilts])
+    roots = np.linalg.cholesky(spreads)
     turns = np.sqrt(np.linalg.eigvalsh(spreads[:, 3:, 3:])[:, -1])
     moves = np.sqrt(np.linalg.eigvalsh(spreads[:, :3, :3])[:, -1])
-    fixed = (
-        np.log([tilt.share for tilt in tilts]),
-        np.linalg.inv(roots),
-        np.log(roots[:, range(6), range(6)]).sum(axis=1),
-        np.ascontiguousarray(spreads[:, :3, :3]),
-        np.column_stack([moves, turns]),
-        np.array([tilt.at_joint.multipliers for tilt in tilts]),
-        np.array([tilt.at_joint.curvature for tilt in tilts]),
-        np.array([links.index(tilt.link) for tilt in tilts]),
+    return Window(
+        log_shares=np.log([tilt.share for tilt in tilts]),
+        inverse_roots=np.linalg.inv(roots),
+        log_dets=np.log(roots[:, range(6), range(6)]).sum(axis=1),
+        spreads=np.ascontiguousarray(spreads[:, :3, :3]),
+        reaches=np.column_stack([moves, turns]),
+        multipliers=np.array([tilt.at_joint.multipliers for tilt in tilts]),
+        curvatures=np.array([tilt.at_joint.curvature for tilt in tilts]),
+        links=np.array([links.index(tilt.link) for tilt in tilts]),
+        radius=float(radius),
     )
-    first = grid.halves
 
-    def work(b: int) -> tuple[Array, NDArray[np.int64], Array, Array]:
-        sums = np.zeros((options.batches, len(links), options.shells))
-        counts = np.zeros(options.shells, np.int64)
-        rows, columns = np.zeros(len(first.log_weights)), np.zeros(len(second[b].log_weights))
-        match_pairs(
-            first.poses,
-            first.log_weights,
-            first.scores,
-            grid.batches,
-            grid.starts,
-            grid.low,
-            grid.size,
-            grid.shape,
-            second[b].poses,
-            second[b].log_weights,
-            second[b].scores,
-            *fixed,
-            options.radius,
-            options.shells,
-            sums,
-            counts,
-            rows,
-            columns,
+
+def matched(
+    first: Halves,
+    cells: Cells,
+    second: list[Halves],
+    tilts: tuple[Tilt, ...],
+    options: HalfChainOptions,
+) -> PairSums:
+    """Sums over all pairs that meet, for first halves sorted into cells."""
+    window = window_of(tilts, options.radius)
+    links = len({tilt.link for tilt in tilts})
+
+    def work(b: int) -> PairTotals:
+        totals = PairTotals(
+            np.zeros((options.batches, links, options.shells)),
+            np.zeros(options.shells, np.int64),
+            np.zeros(len(first.log_weights)),
+            np.zeros(len(second[b].log_weights)),
         )
-        return sums, counts, rows, columns
+        match_pairs(first, cells, second[b], window, totals)
+        return totals
 
-    parts = _map(work, options.batches, options.threads)
-    tables, counts, rows, columns = zip(*parts, strict=True)
+    parts: list[PairTotals] = _map(work, options.batches, options.threads)  # type: ignore
     return PairSums(
-        table=np.stack(tables, axis=1),
-        counts=np.sum(counts, axis=0),
-        rows=np.sum(rows, axis=0),
-        columns=np.concatenate(columns),
+        table=np.stack([part.sums for part in parts], axis=1),
+        counts=np.sum([part.counts for part in parts], axis=0),
+        rows=np.sum([part.rows for part in parts], axis=0),
+        columns=np.concatenate([part.columns for part in parts]),
     )
 
 
@@ -272,29 +261,31 @@ def half_chain_estimate(
     joint = chain.n_steps // 2
     tilts = ring_tilts(search, joint)
     per_batch = options.halves // options.batches
-    if options.tilted and per_batch < 2 * len(tilts):
+    tilted = options.tilted and not closing_is_easy(search)
+    if tilted and per_batch < 2 * len(tilts):
         raise InputError(
             f"half chains of {chain.name}: {options.halves} halves are too few for {len(tilts)} "
             f"tilts; draw {2 * len(tilts) * options.batches} or more"
         )
     streams = rng.spawn(2 * options.batches)
     sides = [
-        _Sampler(chain, tilts, steps, options.tilted)
+        HalfSampler(chain, tilts, steps, tilted)
         for steps in (slice(0, joint), slice(joint, chain.n_steps))
     ]
 
-    def draw(index: int) -> _Halves:
+    def draw(index: int) -> Halves:
         return sides[index % 2].draw(per_batch, streams[index])
 
-    drawn: list[_Halves] = _map(draw, 2 * options.batches, options.threads)  # type: ignore
+    drawn: list[Halves] = _map(draw, 2 * options.batches, options.threads)  # type: ignore
     first, second = drawn[0::2], drawn[1::2]
     reach = options.radius * max(
-        float(np.sqrt(np.linalg.eigvalsh(tilt.at_joint.spread[:3, :3])[-1])) for tilt in tilts
+        float(np.sqrt(np.linalg.eigvalsh(tilt.window[:3, :3])[-1])) for tilt in tilts
     )
-    grid = _Grid(_Halves.joined(first), np.repeat(np.arange(options.batches), per_batch), reach)
+    batches = np.repeat(np.arange(options.batches), per_batch)
+    halves, cells = sorted_into_cells(joined(first), batches, reach)
     return window_estimate(
         chain,
-        _matched(grid, second, tilts, options),
+        matched(halves, cells, second, tilts, options),
         sorted({tilt.link for tilt in tilts}),
         len(tilts),
         per_batch,
@@ -330,8 +321,21 @@ def half_chain(
     options = options or HalfChainOptions()
     search = find_rings(target) if isinstance(target, Chain) else target
     estimate = half_chain_estimate(search, options, generator(rng))
-    chain = search.chain
-    if not math.isfinite(estimate.log_j):
+    return half_chain_result(search.chain, options, estimate, time.perf_counter() - began)
+
+
+def half_chain_result(
+    chain: Chain, options: HalfChainOptions, estimate: HalfChainEstimate, seconds: float
+) -> JFactor:
+    """J from an estimate with its diagnosis.
+
+    Raises
+    ------
+    SolveError
+        Too few pairs met to extrapolate the window.
+    """
+    log_j, stderr = estimate.best
+    if not math.isfinite(log_j):
         raise SolveError(
             f"half chains of {chain.name}: too few pairs to extrapolate the window; draw more "
             "halves",
@@ -352,14 +356,14 @@ def half_chain(
         target=chain.name,
         n_bp=chain.n_steps,
         method="half-chain" if options.tilted else "half-chain-plain",
-        minus_lnJ=-estimate.log_j,
-        stderr=estimate.stderr,
+        minus_lnJ=-log_j,
+        stderr=stderr,
         bias_bound=abs(estimate.bias),
         links=estimate.links,
         samples=2 * (options.halves // options.batches) * options.batches,
         effective_samples=estimate.effective_halves,
         pareto_shape=tail,
-        seconds=time.perf_counter() - began,
+        seconds=seconds,
         warnings=tuple(warnings),
         status=JStatus.HEAVY_TAILS if heavy else JStatus.CONVERGED,
     )

@@ -72,6 +72,27 @@ def aligned_ends_j(length_A: float, persistence_A: float) -> float:
     return PER_CUBIC_ANGSTROM_IN_MOLAR * density
 
 
+def long_ring_j(length_A: float, persistence_A: float) -> float:
+    """J in mol/L of a long rod's ends that meet with aligned tangents, twist averaged over.
+
+    With L in Kuhn lengths the ends of a Gaussian chain meet with the density (3 / 2 pi L)^(3/2),
+    stiffness takes 5 / 8L of it off (Daniels 1952; Yamakawa & Stockmayer, J. Chem. Phys. 57, 2843
+    (1972)), and given both tangents u and u' the mean end is (u + u') / 2, which multiplies with
+    exp(-3 |u + u'|^2 / 8L) over its mean: another 3 / 4L for aligned ones. The next term is of
+    order 1 / L^2, which limits this to L of ten or more.
+
+    Raises
+    ------
+    InputError
+        A length is not positive.
+    """
+    _positive(length_A=length_A, persistence_A=persistence_A)
+    kuhn = 2.0 * persistence_A
+    length = length_A / kuhn
+    density = (3.0 / (2.0 * math.pi * length)) ** 1.5 * (1.0 - 11.0 / (8.0 * length)) / kuhn**3
+    return PER_CUBIC_ANGSTROM_IN_MOLAR * density
+
+
 def writhe_variance(length_A: float, persistence_A: float) -> float:
     """Variance (turns squared) of the writhe of a torsionally free ring, to lowest order in L/P."""
     _positive(length_A=length_A, persistence_A=persistence_A)

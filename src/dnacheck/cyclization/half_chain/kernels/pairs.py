@@ -8,7 +8,7 @@ which coincides with base pair 0 in a ring.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -17,58 +17,130 @@ from dnacheck.model.chain_kernels import step_rotation
 from dnacheck.numerics.rotations import matrix_from_quaternion, quaternion_from_matrix
 
 
+class Halves(NamedTuple):
+    """Halves of one side of the joint.
+
+    Attributes
+    ----------
+    poses : ndarray, shape (M, 7)
+        Position of the joint (steps) and its quaternion as in (4.8), scalar last.
+    log_weights : ndarray, shape (M,)
+    scores : ndarray, shape (M, K)
+        Logarithm of each tilt's density over the free chain's.
+    """
+
+    poses: Any
+    log_weights: Any
+    scores: Any
+
+
+class Cells(NamedTuple):
+    """A grid of cubes into which first halves are sorted.
+
+    Attributes
+    ----------
+    starts : ndarray, shape (cells + 1,)
+        First member of each cell.
+    low : ndarray, shape (3,)
+    size : float
+    shape : ndarray, shape (3,)
+    batches : ndarray, shape (M,)
+        Batch of each half.
+    """
+
+    starts: Any
+    low: Any
+    size: float
+    shape: Any
+    batches: Any
+
+
+class Window(NamedTuple):
+    """The window of every tilt, and the correction within it.
+
+    Attributes
+    ----------
+    log_shares : ndarray, shape (K,)
+    inverse_roots, log_dets : ndarray, shapes (K, 6, 6), (K,)
+        L^-1 and log det L, L L^T the spread of the mismatch.
+    spreads : ndarray, shape (K, 3, 3)
+        Spread of the displacement in the frame of the joint.
+    reaches : ndarray, shape (K, 2)
+        Largest displacement and rotation angle within radius 1.
+    multipliers, curvatures : ndarray, shapes (K, 6), (K, 6, 6)
+        m and S in RT.
+    links : ndarray, shape (K,)
+        Index of each tilt's link.
+    radius : float
+    """
+
+    log_shares: Any
+    inverse_roots: Any
+    log_dets: Any
+    spreads: Any
+    reaches: Any
+    multipliers: Any
+    curvatures: Any
+    links: Any
+    radius: float
+
+
+class PairTotals(NamedTuple):
+    """Sums over pairs, all added to.
+
+    Attributes
+    ----------
+    sums : ndarray, shape (batches, links, shells)
+    counts : ndarray, shape (shells,)
+    rows, columns : ndarray, shapes (Ma,), (Mb,)
+        Sums over partners.
+    """
+
+    sums: Any
+    counts: Any
+    rows: Any
+    columns: Any
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def half_poses(
     normals: Any,
     roots: Any,
     centre: Any,
     ground: Any,
-    pulls: Any,
-    energies: Any,
     form: int,
     backward: bool,
-    positions: Any,
-    quaternions: Any,
-    scores: Any,
+    poses: Any,
 ) -> None:
-    """Poses of halves drawn about one centre, and their log density ratios to the free chain.
+    """Poses of halves drawn about one centre.
 
     Parameters
     ----------
-    normals : (M, n, 3), standard normal numbers.
+    normals : (M, n, 3), standard normal numbers; overwritten with the strains q - q^.
     roots : (n, 3, 3), Cholesky roots of the covariance of each step's angles.
     centre, ground : (n, 3), mean and unstressed angles in radians.
-    pulls, energies : (K, n, 3), (K,), K (q* - q^) and energy in RT of this half of each tilt.
     form : 0 for the wedge, 1 for the mid-step product.
     backward : whether the half is followed from its far end to its near one.
-    positions, quaternions, scores : (M, 3), (M, 4), (M, K), filled; a score is the logarithm of
-        the tilted over the free density of the drawn angles. Quaternions as in (4.8), scalar last.
+    poses : (M, 7), filled; see :class:`Halves`.
     """
     n = normals.shape[1]
-    tilts = pulls.shape[0]
     step = np.empty((3, 3))
     f = np.empty((3, 3))
     g = np.empty((3, 3))
     r = np.empty(3)
-    x = np.empty(3)
     a = np.empty(3)
     for m in range(normals.shape[0]):
         for i in range(3):
             r[i] = 0.0
             for j in range(3):
                 f[i, j] = 1.0 if i == j else 0.0
-        for k in range(tilts):
-            scores[m, k] = -energies[k]
         for s in range(n):
             for i in range(3):
                 a[i] = centre[s, i]
                 for j in range(i + 1):
                     a[i] += roots[s, i, j] * normals[m, s, j]
-                x[i] = a[i] - ground[s, i]
-            for k in range(tilts):
-                scores[m, k] += (
-                    pulls[k, s, 0] * x[0] + pulls[k, s, 1] * x[1] + pulls[k, s, 2] * x[2]
-                )
+            for i in range(3):
+                normals[m, s, i] = a[i] - ground[s, i]
             step_rotation(a[0], a[1], a[2], form, step)
             for i in range(3):
                 r[i] += f[i, 2]
@@ -79,13 +151,13 @@ def half_poses(
                     f[i, j] = g[i, j]
         for i in range(3):
             if backward:
-                positions[m, i] = -(f[0, i] * r[0] + f[1, i] * r[1] + f[2, i] * r[2])
+                poses[m, i] = -(f[0, i] * r[0] + f[1, i] * r[1] + f[2, i] * r[2])
             else:
-                positions[m, i] = r[i]
-        quaternion_from_matrix(f, quaternions[m])
+                poses[m, i] = r[i]
+        quaternion_from_matrix(f, poses[m, 3:])
         if backward:
-            for i in range(3):
-                quaternions[m, i] = -quaternions[m, i]
+            for i in range(3, 6):
+                poses[m, i] = -poses[m, i]
 
 
 @njit(cache=True, nogil=True)
@@ -140,55 +212,26 @@ def fill_cells(positions: Any, low: Any, size: float, shape: Any, cells: Any) ->
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def match_pairs(
-    poses_a: Any,
-    log_weights_a: Any,
-    scores_a: Any,
-    batches_a: Any,
-    starts: Any,
-    low: Any,
-    size: float,
-    shape: Any,
-    poses_b: Any,
-    log_weights_b: Any,
-    scores_b: Any,
-    log_shares: Any,
-    inverse_roots: Any,
-    log_dets: Any,
-    spreads: Any,
-    reaches: Any,
-    multipliers: Any,
-    curvatures: Any,
-    links: Any,
-    radius: float,
-    shells: int,
-    sums: Any,
-    counts: Any,
-    row_sums: Any,
-    column_sums: Any,
-) -> None:
+def match_pairs(first: Any, cells: Any, second: Any, window: Any, totals: Any) -> None:
     """Weights of all pairs of halves that meet within a window, by batch, link and shell.
 
     First halves (a) are sorted by cell and, within a cell, by the size of the first component
-    of their quaternion; ``starts`` (cells + 1,) are the cells' first members. The window is the
-    ellipsoid |L^-1 c| <= radius, L L^T the spread of the mismatch c of the tilt that the second
-    half (b) most likely came from. Each pair counts with the product of its weights, the volume
-    factor of the window's measure, and exp(-m.c + c.S.c / 2) of the tilt that the pair most
-    likely came from, which takes the window's bias down to what is left after second order.
+    of their quaternion. The window is the ellipsoid |L^-1 c| <= radius of the tilt that the second
+    half (b) most likely came from, in shells of equal width in the square of |L^-1 c| / radius.
+    Each pair counts with the product of its weights, the volume factor of the window's measure,
+    and exp(-m.c + c.S.c / 2) of the tilt that the pair most likely came from, which takes the
+    window's bias down to what is left after second order.
 
     Parameters
     ----------
-    poses_a, poses_b : (M, 7), position (steps) and quaternion (scalar last).
-    inverse_roots, log_dets : (K, 6, 6), (K,), L^-1 and log det L of each tilt.
-    spreads : (K, 3, 3), spread of the displacement in the frame of the joint.
-    reaches : (K, 2), largest displacement and rotation angle within radius 1.
-    multipliers, curvatures : (K, 6), (K, 6, 6), m and S in RT.
-    links : (K,), index of each tilt's link.
-    shells : shells of equal width in the square of |L^-1 c| / radius.
-    sums : (A, links, shells), added to; one row per batch of first halves.
-    counts : (shells,) number of pairs, added to.
-    row_sums, column_sums : (Ma,), (Mb,), sums over partners, added to.
+    first, second : Halves. cells : Cells, of the first. window : Window. totals : PairTotals.
     """
+    poses_a, log_weights_a, scores_a = first
+    poses_b, log_weights_b, scores_b = second
+    starts, low, size, shape = cells.starts, cells.low, cells.size, cells.shape
+    log_shares, links, radius = window.log_shares, window.links, window.radius
+    spreads, reaches = window.spreads, window.reaches
+    shells = totals.counts.shape[0]
     c = np.empty(6)
     frame = np.empty((3, 3))
     square = radius * radius
@@ -200,7 +243,7 @@ def match_pairs(
             score = log_shares[k] + scores_b[b, k]
             if score > best:
                 best, label = score, k
-        root = inverse_roots[label]
+        root = window.inverse_roots[label]
         matrix_from_quaternion(poses_b[b, 3:], frame)
         most_turn = min(radius * reaches[label, 1], math.pi)
         cosine = math.cos(0.5 * most_turn)
@@ -276,15 +319,15 @@ def match_pairs(
                             score = log_shares[k] + scores_a[a, k] + scores_b[b, k]
                             if score > best:
                                 best, tilt = score, k
-                        exponent = log_weights_a[a] + log_weights_b[b] - log_dets[label]
+                        exponent = log_weights_a[a] + log_weights_b[b] - window.log_dets[label]
                         exponent += log_volume_factor(c[3] * c[3] + c[4] * c[4] + c[5] * c[5])
                         for i in range(6):
-                            exponent -= multipliers[tilt, i] * c[i]
+                            exponent -= window.multipliers[tilt, i] * c[i]
                             for j in range(6):
-                                exponent += 0.5 * c[i] * curvatures[tilt, i, j] * c[j]
+                                exponent += 0.5 * c[i] * window.curvatures[tilt, i, j] * c[j]
                         weight = math.exp(exponent)
                         shell = min(int(shells * distance / square), shells - 1)
-                        sums[batches_a[a], links[tilt], shell] += weight
-                        counts[shell] += 1
-                        row_sums[a] += weight
-                        column_sums[b] += weight
+                        totals.sums[cells.batches[a], links[tilt], shell] += weight
+                        totals.counts[shell] += 1
+                        totals.rows[a] += weight
+                        totals.columns[b] += weight
