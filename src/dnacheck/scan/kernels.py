@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from dnacheck.equilibria.discrete.kernels.cut import fill_shape, least_rotation, rotated
+from dnacheck.equilibria.discrete.kernels.cut import fill_shape, rotated
 from dnacheck.equilibria.discrete.kernels.newton import (
     ENERGY,
     LOG_DET_KKT,
@@ -17,6 +17,7 @@ from dnacheck.equilibria.discrete.kernels.newton import (
     NewtonLimits,
 )
 from dnacheck.equilibria.discrete.kernels.search import Minima, SearchPlan, search_as_cut
+from dnacheck.model.cut import least_rotation
 from dnacheck.numerics.curve_topology import edge_frames, link_of_ring
 
 # Positions of the figures of a scanned molecule.

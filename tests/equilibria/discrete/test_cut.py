@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from dnacheck.cyclization.laplace.isolated import laplace
-from dnacheck.equilibria.discrete.kernels.cut import least_rotation, rotated
+from dnacheck.equilibria.discrete.kernels.cut import rotated
 from dnacheck.equilibria.discrete.search import find_rings, search_minima
 from dnacheck.equilibria.discrete.solve import NewtonOptions, solve_ring
 from dnacheck.model.chain import Chain, build_chain
+from dnacheck.model.cut import least_rotation
 from dnacheck.model.parameters import load_parameters
 from dnacheck.model.sequence import Sequence
 from dnacheck.scan.scan import scan_row

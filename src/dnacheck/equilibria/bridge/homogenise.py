@@ -30,7 +30,7 @@ from dnacheck.equilibria.ring import Equilibrium
 from dnacheck.model.chain import Chain, chain_frames
 from dnacheck.model.rod.filtering import double_filter, padded_steps
 from dnacheck.model.rod.natural_frame import NaturalFrame, evaluate_at_parameter, natural_frame
-from dnacheck.model.rod.rod import Rod, _fit_breaks
+from dnacheck.model.rod.rod import Rod, _fit_breaks, as_cut
 from dnacheck.model.rod.spline import fit_spline
 from dnacheck.numerics.outcome import InputError
 
@@ -83,7 +83,7 @@ class CorrectedEnergy:
 
 
 def step_axes(chain: Chain, rod: Rod) -> StepAxes:
-    """Hinges and axes of a chain's steps in the natural frame of its rod.
+    """Hinges and axes of a chain's steps, in its own order, in the natural frame of its rod.
 
     Raises
     ------
@@ -92,6 +92,7 @@ def step_axes(chain: Chain, rod: Rod) -> StepAxes:
     """
     if chain.n_steps != rod.n_steps:
         raise InputError(f"the rod has {rod.n_steps} steps, the chain {chain.n_steps}")
+    chain = as_cut(chain, rod.cut)
     natural, start = _fitted(chain, rod)
     n = chain.n_steps
     centres, frames = np.empty((n + 1, 3)), np.empty((n + 1, 3, 3))
@@ -102,7 +103,8 @@ def step_axes(chain: Chain, rod: Rod) -> StepAxes:
     hinges: Array = np.arange(n, dtype=float) + 1.0
     s, d1, d3 = evaluate_at_parameter(natural, hinges)
     triad = np.stack([d1, np.cross(d3, d1), d3], axis=-1)
-    local = np.einsum("iab,iac->ibc", triad, axes)
+    local = np.roll(np.einsum("iab,iac->ibc", triad, axes), rod.cut, axis=0)
+    s = np.roll(s, rod.cut)
     for array in (s, local):
         array.setflags(write=False)
     return StepAxes(s, local)

@@ -85,6 +85,9 @@ def reconstruct(ring: Equilibrium, step_form: StepForm = "wedge") -> Reconstruct
         raise InputError("reconstruction: a d1 lies along the centreline; refine the mesh")
     d1 = d1 - along[:, None] * d3
     d1 /= np.linalg.norm(d1, axis=1, keepdims=True)
+    # The rod may start at another base pair than the molecule.
+    own = (np.arange(n + 1) - ring.rod.cut) % n
+    centres, d1, d3 = centres[own], d1[own], d3[own]
     frames = np.stack([d1, np.cross(d3, d1), d3], axis=2)
     return Reconstruction(
         centres=centres,

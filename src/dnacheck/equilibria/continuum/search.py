@@ -7,8 +7,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from dnacheck.equilibria.continuum.coarse_chain import coarse_minima
 from dnacheck.equilibria.continuum.options import ContinuumOptions
-from dnacheck.equilibria.continuum.solver import SOLVED, attempts
+from dnacheck.equilibria.continuum.solver import SOLVED, attempts, near
 from dnacheck.equilibria.ring import Equilibria, Equilibrium
 from dnacheck.model.rod.rod import Rod
 from dnacheck.numerics.outcome import InputError, Status
@@ -49,12 +50,13 @@ def lowest_continuum_ring(
 ) -> Equilibria:
     """Search links and registers for continuum rings.
 
-    Each link starts from the perfect ring in the register that first-order perturbation prefers;
-    where Newton's method finds no minimum from there the paths of ``homotopy`` are tried, and
-    where they find none either, the other registers get the same treatment. Links whose minimum
-    lies within 8 RT of the lowest also start from the other registers, by Newton's method alone:
-    that finds second minima and the saddle between registers. Where one link is asked for, only
-    rings whose link it is are returned.
+    Each link starts from the minima of the rod cut into straight pieces
+    (:mod:`dnacheck.equilibria.continuum.coarse_chain`). Where Newton's method finds no minimum from
+    there the perfect ring is tried in the register that first-order perturbation prefers, then the
+    paths of ``homotopy``, and where they find none either, the other registers get the same
+    treatment. Links whose minimum lies within 8 RT of the lowest also start from the other
+    registers, by Newton's method alone: that finds the saddles between registers. Where one link
+    is asked for, only rings whose link it is are returned.
 
     Parameters
     ----------
@@ -82,9 +84,22 @@ def lowest_continuum_ring(
     found: list[Equilibrium] = []
     failures: list[Equilibrium] = []
     pending: dict[int, list[float]] = {}
+    unit = rod.energy_scale_RT
+    coarse = coarse_minima(
+        rod,
+        wanted,
+        0 if links == "auto" else _ALL_REGISTERS,
+        _WINDOW_RT / unit if links == "auto" else np.inf,
+    )
     for link in wanted:
-        # Registers in turn, with detours, until one of them gives a minimum.
         pending[link] = list(turns)
+        of_link = [start for start in coarse if start.link == link]
+        starts += len(of_link)
+        reached = [_collect(near(rod, start, options), found, failures) for start in of_link]
+        if any(reached):
+            del pending[link][0]
+            continue
+        # Registers in turn, with detours, until one of them gives a minimum.
         while pending[link]:
             starts += 1
             if _collect(attempts(rod, link, pending[link].pop(0), options), found, failures):

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from dnacheck.equilibria.continuum.coarse_chain import CoarseRing, start_from_pieces
 from dnacheck.equilibria.continuum.collocation import aligned_mesh, bisect, discretise
 from dnacheck.equilibria.continuum.curve import Curve
 from dnacheck.equilibria.continuum.homotopy import detours
@@ -103,6 +104,16 @@ def attempts(
             yield refine(state, alpha, options)
         else:
             yield _finish(state, alpha, _STATUS[state.code], options)
+
+
+def near(rod: Rod, start: CoarseRing, options: ContinuumOptions) -> Iterator[Equilibrium]:
+    """The ring that Newton's method reaches from a minimum of the rod in pieces."""
+    alpha = rod.end_rotation + 2.0 * np.pi * start.link
+    state = start_from_pieces(rod, start, options)
+    if run_newton(state, state.disc.coefficients(), alpha, options):
+        yield refine(state, alpha, options)
+    else:
+        yield _finish(state, alpha, _STATUS[state.code], options)
 
 
 def refine(state: State, alpha: float, options: ContinuumOptions) -> Equilibrium:

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dnacheck.model.chain import Chain, chain_frames
+from dnacheck.model.cut import least_rotation
 from dnacheck.model.rod import chebyshev
 from dnacheck.model.rod.filtering import double_filter, padded_steps
 from dnacheck.model.rod.natural_frame import NaturalFrame, evaluate_at_parameter, natural_frame
 from dnacheck.model.rod.options import RodOptions
 from dnacheck.model.rod.spline import evaluate, fit_spline
-from dnacheck.model.rod.stiffness import rod_stiffness
+from dnacheck.model.rod.stiffness import require_positive, rod_stiffness
 from dnacheck.numerics.outcome import InputError
 
 Array = NDArray[np.float64]
@@ -47,6 +48,9 @@ class Rod:
     energy_scale_RT, rise_A : float
         Of the chain.
     options : RodOptions
+    cut : int
+        Base pair of the molecule at s = 0: a ring's rod is that of its canonical cut. s_frames and
+        omega count from it.
     fit_rms, fit_condition : float
         Rms distance in steps of the fit from the filtered points; condition of the fit.
     frame_orthogonality, frame_residual : float
@@ -74,6 +78,7 @@ class Rod:
     energy_scale_RT: float
     rise_A: float
     options: RodOptions
+    cut: int = 0
     fit_rms: float = 0.0
     fit_condition: float = 1.0
     frame_orthogonality: float = 0.0
@@ -170,7 +175,20 @@ def _omega(chain: Chain, d1: Array, natural_d1: Array, d3: Array) -> tuple[Array
     )
 
 
-def build_rod(chain: Chain, options: RodOptions | None = None) -> Rod:
+def as_cut(chain: Chain, cut: int) -> Chain:
+    """The ring of a chain, read from base pair ``cut`` on."""
+    if cut == 0:
+        return chain
+    return replace(
+        chain,
+        ground=np.roll(chain.ground, -cut, axis=0),
+        stiffness=np.roll(chain.stiffness, -cut, axis=0),
+        letters=chain.letters[cut:] + chain.letters[:cut],
+        a_tract_regions=(),
+    )
+
+
+def build_rod(chain: Chain, options: RodOptions | None = None, cut: int | None = None) -> Rod:
     """Continuum rod of a chain: Sections V to VII.
 
     Parameters
@@ -178,6 +196,10 @@ def build_rod(chain: Chain, options: RodOptions | None = None) -> Rod:
     chain : Chain
     options : RodOptions, optional
         Default: the paper's (w, k, m) = (15, 20, 6) with 50 base pairs of padding.
+    cut : int, optional
+        Base pair at s = 0. By default that of the canonical cut (:mod:`dnacheck.model.cut`), so
+        that a ring has one rod whichever base pair is called the first; the spline's pieces move
+        with the cut, and energies with them by about 1e-4 of their value.
 
     Raises
     ------
@@ -188,6 +210,9 @@ def build_rod(chain: Chain, options: RodOptions | None = None) -> Rod:
     options = RodOptions() if options is None else options
     chain.require_hinges("the continuum rod")
     n = chain.n_steps
+    require_positive(chain.stiffness)
+    cut = int(least_rotation(chain.arrays)) if cut is None else cut % n
+    chain = as_cut(chain, cut)
     padded = chain.ground[padded_steps(n, options.padding)]
     centres, frames = chain_frames(padded, chain.step_form)
     if 3 * (options.filter_width - 1) >= len(centres):
@@ -235,6 +260,7 @@ def build_rod(chain: Chain, options: RodOptions | None = None) -> Rod:
         energy_scale_RT=chain.energy_scale_RT,
         rise_A=chain.rise_A,
         options=options,
+        cut=cut,
         fit_rms=curve.rms_residual,
         fit_condition=curve.condition,
         frame_orthogonality=natural.orthogonality,

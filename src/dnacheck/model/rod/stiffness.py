@@ -54,6 +54,19 @@ def _body_compliance(stiffness: Array) -> Array:
     return np.asarray(np.linalg.inv(reordered), dtype=float)
 
 
+def require_positive(stiffness: Array) -> None:
+    """Refuse stiffnesses (N, 3, 3) that are not positive definite.
+
+    Raises
+    ------
+    InputError
+    """
+    smallest = np.linalg.eigvalsh(stiffness)[:, 0]
+    if not np.all(smallest > 0.0):
+        step = int(np.argmin(smallest))
+        raise InputError(f"stiffness of step {step + 1}: not positive definite; correct its matrix")
+
+
 def rod_stiffness(stiffness: Array, phase: Array, options: RodOptions) -> RodStiffness:
     """Average the step stiffnesses in the natural frame.
 
@@ -68,13 +81,9 @@ def rod_stiffness(stiffness: Array, phase: Array, options: RodOptions) -> RodSti
     Raises
     ------
     InputError
-        Not positive definite, or too much anisotropy or coupling survives the average.
+        Too much anisotropy or coupling survives the average.
     """
     n = len(stiffness)
-    smallest = np.linalg.eigvalsh(stiffness)[:, 0]
-    if not np.all(smallest > 0.0):
-        step = int(np.argmin(smallest))
-        raise InputError(f"stiffness of step {step + 1}: not positive definite; correct its matrix")
     compliance = _body_compliance(stiffness)
     cosine, sine = np.cos(phase), np.sin(phase)
     turn = np.zeros((n, 3, 3))

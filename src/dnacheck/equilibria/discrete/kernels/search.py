@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from dnacheck.equilibria.boundary_kernels import ring_boundary
-from dnacheck.equilibria.discrete.kernels.cut import least_rotation, roll_back, rotated
+from dnacheck.equilibria.discrete.kernels.cut import roll_back, rotated
 from dnacheck.equilibria.discrete.kernels.newton import (
     CLOSURE,
     CONVERGED,
@@ -31,6 +31,7 @@ from dnacheck.equilibria.discrete.kernels.rigid_starts import fill_rigid_circle,
 from dnacheck.equilibria.discrete.kernels.starts import circle_registers, fill_circle, fill_relaxed
 from dnacheck.equilibria.discrete.kernels.states import by_kind
 from dnacheck.model.chain_kernels import HingeSteps
+from dnacheck.model.cut import least_rotation
 from dnacheck.model.rigid_kernels import RigidSteps
 
 # Two minima are one when their energies agree to this relative precision and their angles to
