@@ -86,7 +86,7 @@ def test_a_trajectory_that_turns_to_nan_exits_3_and_keeps_the_frames_before(caps
         (["--trajectory", "{d}/small.pdb"], "beads of 42 steps"),
         (["--trajectory", "{d}/ring.pdb", "--step", "0"], "--step 0"),
         (["--trajectory", "{d}/ring.pdb", "--centres", "name X"], "make no chain"),
-        (["--step-fraction", "0"], "greater than 0"),
+        (["--step-fraction", "0"], "from 0.001 to 1"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(capsys, files, arguments, message):

@@ -118,7 +118,7 @@ def test_a_bad_record_is_named_and_the_rest_go_on(capsys, tmp_path):
         (["ACGT"], "too few"),
         ([""], "empty"),
         (["no/such/file.fasta"], "no/such/file.fasta"),
-        (["11T15", "--twist-ratio", "0"], "greater than 0"),
+        (["11T15", "--twist-ratio", "0"], "from 0.01 to 100"),
         (["11T15", "--filter-width", "60"], "filter"),
         (["11T15", "--angles", "none-such"], "none-such"),
         (["11T15", "--a-tracts", "150..160"], "157"),

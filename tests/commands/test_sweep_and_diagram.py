@@ -42,8 +42,8 @@ def test_sweep_table_and_picture(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("ratios", "message"),
     [
-        ("0:1:3", "greater than 0"),
-        ("-0.5:1:3", "greater than 0"),
+        ("0:1:3", "from 0.01 to 100"),
+        ("-0.5:1:3", "from 0.01 to 100"),
         ("1:0.5:3", "below the last"),
         ("0.5:1.5", "FIRST:LAST:NUMBER"),
         ("0.5:1.5:0", "between 1"),

@@ -12,15 +12,16 @@ A command is written ::
 from __future__ import annotations
 
 import functools
-import math
 import os
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any, Literal, TypeVar
 
 import click
 
+from dnacheck.commands import option_types as allowed
+from dnacheck.commands.option_types import Count, LinkChoice, Number, StepRange
+from dnacheck.model import ranges
 from dnacheck.model.data_files import PARAMETER_SETS
 from dnacheck.numerics.processors import available_processors
 
@@ -91,58 +92,6 @@ class ContinuumSettings:
     """Of the polynomials, m."""
 
 
-class PositiveNumber(click.ParamType):
-    """A finite number greater than zero."""
-
-    name = "number"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        try:
-            number = float(value)
-        except (TypeError, ValueError):
-            self.fail(f"{value!r} is not a number", param, ctx)
-        if not (math.isfinite(number) and number > 0.0):
-            self.fail(f"{value} is not a finite number greater than 0", param, ctx)
-        return number
-
-
-class LinkChoice(click.ParamType):
-    """``auto``, ``all`` or an integer."""
-
-    name = "auto|all|integer"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> str | int:
-        if isinstance(value, int) or value in ("auto", "all"):
-            return value
-        try:
-            return int(value)
-        except ValueError:
-            self.fail(f"{value!r} is not 'auto', 'all' or an integer", param, ctx)
-
-
-class StepRange(click.ParamType):
-    """``auto``, ``tracts-only``, ``none`` or ``A..B``, 0-based steps, both included."""
-
-    name = "auto|tracts-only|none|A..B"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> str | tuple[int, int]:
-        if isinstance(value, tuple) or value in ("auto", "tracts-only", "none"):
-            return value
-        match = re.fullmatch(r"([0-9]{1,9})\.\.([0-9]{1,9})", value)
-        if match is None:
-            self.fail(f"{value!r} is not 'auto', 'none' or A..B, such as 30..92", param, ctx)
-        first, last = int(match[1]), int(match[2])
-        if first > last:
-            self.fail(f"the first step {first} lies after the last step {last}", param, ctx)
-        return first, last
-
-
 def limit_library_threads(threads: int) -> None:
     """Tell libraries that are not loaded yet to use at most so many threads."""
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -192,7 +141,7 @@ def common_options(function: Function) -> Function:
             click.option(
                 "--seed",
                 "run__seed",
-                type=click.IntRange(min=0),
+                type=Count(allowed.SEED),
                 default=0,
                 show_default=True,
                 help="Seed of the random numbers.",
@@ -200,7 +149,7 @@ def common_options(function: Function) -> Function:
             click.option(
                 "--threads",
                 "run__threads",
-                type=click.IntRange(min=1),
+                type=Count(allowed.THREADS),
                 default=None,
                 callback=_threads,
                 help="Threads to use; results do not depend on it.  [default: all processors]",
@@ -232,21 +181,21 @@ def model_options(function: Function) -> Function:
             click.option(
                 "--twist-ratio",
                 "model__twist_ratio",
-                type=PositiveNumber(),
+                type=Number(ranges.TWIST_RATIO),
                 default=None,
                 help="Twisting over bending stiffness.  [default: 1.5, or the set's own]",
             ),
             click.option(
                 "--persistence-length",
                 "model__persistence_length",
-                type=PositiveNumber(),
+                type=Number(ranges.PERSISTENCE_LENGTH_A),
                 default=None,
                 help="In Å.  [default: 463, or what six parameters bring]",
             ),
             click.option(
                 "--rise",
                 "model__rise",
-                type=PositiveNumber(),
+                type=Number(ranges.RISE_A),
                 default=None,
                 help="In Å per base-pair step.  [default: 3.4, or what six parameters bring]",
             ),
@@ -312,7 +261,7 @@ def continuum_options(function: Function) -> Function:
             click.option(
                 "--filter-width",
                 "continuum__filter_width",
-                type=click.IntRange(min=1),
+                type=Count(allowed.FILTER_WIDTH),
                 default=15,
                 show_default=True,
                 help="Width of the filter, base pairs.",
@@ -320,7 +269,7 @@ def continuum_options(function: Function) -> Function:
             click.option(
                 "--intervals",
                 "continuum__intervals",
-                type=click.IntRange(min=1),
+                type=Count(allowed.INTERVALS),
                 default=20,
                 show_default=True,
                 help="Pieces of the spline.",
@@ -328,7 +277,7 @@ def continuum_options(function: Function) -> Function:
             click.option(
                 "--degree",
                 "continuum__degree",
-                type=click.IntRange(min=1),
+                type=Count(allowed.DEGREE),
                 default=6,
                 show_default=True,
                 help="Degree of the spline.",

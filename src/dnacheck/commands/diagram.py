@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dnacheck.commands import option_types as allowed
 from dnacheck.commands.common import (
     ContinuumSettings,
     ModelSettings,
@@ -16,6 +17,7 @@ from dnacheck.commands.common import (
     model_options,
     target_argument,
 )
+from dnacheck.commands.option_types import Count, Number
 from dnacheck.commands.output import note, print_json
 
 if TYPE_CHECKING:
@@ -30,14 +32,14 @@ EXIT_NOT_CONVERGED = 3
 @target_argument
 @click.option(
     "--bounds",
-    type=(float, float),
+    type=(Number(allowed.TURNS), Number(allowed.TURNS)),
     default=None,
     metavar="FIRST LAST",
     help="End twist alpha between which branches are followed, in turns.",
 )
 @click.option(
     "--start",
-    type=float,
+    type=Number(allowed.TURNS),
     default=None,
     metavar="TURNS",
     help="End twist to start from, in turns.  [default: the lowest ring's; perfect: 0.08]",
@@ -50,13 +52,13 @@ EXIT_NOT_CONVERGED = 3
 )
 @click.option(
     "--max-points",
-    type=click.IntRange(min=1),
+    type=Count(allowed.POINTS),
     default=3000,
     show_default=True,
     help="Points per branch and direction.",
 )
 @click.option(
-    "--bp", "n_bp", type=click.IntRange(min=4), default=158, show_default=True,
+    "--bp", "n_bp", type=Count(allowed.BASE_PAIRS), default=158, show_default=True,
     help="Base pairs of the perfect rod.",
 )  # fmt: skip
 @click.option("--plot", type=click.Path(path_type=Path), default=None, help="Write a picture.")

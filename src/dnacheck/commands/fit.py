@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dnacheck.commands import option_types as allowed
 from dnacheck.commands.common import (
     ModelSettings,
-    PositiveNumber,
     RunSettings,
     common_options,
     model_options,
 )
+from dnacheck.commands.option_types import Number
 from dnacheck.commands.output import note, print_json, progress
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ DEFAULT_FREE = "persistence_length_A,twist_ratio,twist_offset_deg,bend_scale"
 @click.option("--robust", is_flag=True, help="Huber's loss, which forgives outliers.")
 @click.option(
     "--tolerance",
-    type=PositiveNumber(),
+    type=Number(allowed.TOLERANCE),
     default=0.02,
     show_default=True,
     help="Standard error of each computed ln J.",

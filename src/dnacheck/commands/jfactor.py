@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dnacheck.commands import option_types as allowed
 from dnacheck.commands.common import (
-    LinkChoice,
     ModelSettings,
-    PositiveNumber,
     RunSettings,
     common_options,
     model_options,
     target_argument,
 )
+from dnacheck.commands.option_types import LinkChoice, Number
 from dnacheck.commands.output import note, print_json, progress
 from dnacheck.commands.time_limit import within
 from dnacheck.cyclization.methods import METHODS, method_named
@@ -40,14 +40,14 @@ EXIT_NOT_CONVERGED = 3
 )
 @click.option(
     "--tolerance",
-    type=PositiveNumber(),
+    type=Number(allowed.TOLERANCE),
     default=0.02,
     show_default=True,
     help="Standard error wanted on ln J.",
 )
 @click.option(
     "--max-seconds",
-    type=PositiveNumber(),
+    type=Number(allowed.SECONDS),
     default=None,
     help="Stop this long after the start with the best so far (exit code 3).",
 )
@@ -72,6 +72,7 @@ def command(
     from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
     from dnacheck.io.sequences import read_target
     from dnacheck.model.chain import build_chain
+    from dnacheck.model.ranges import check_link
     from dnacheck.numerics.outcome import InputError, SolveError, TimeLimitReachedError
 
     records: list[dict[str, Any]] = []
@@ -88,6 +89,7 @@ def command(
             continue
         began = time.perf_counter()
         chain = build_chain(molecule, **model.chain_arguments())
+        check_link(link, chain.n_steps)
 
         def compute(left: float, chain: Chain = chain) -> JFactor:
             searching = time.perf_counter()

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dnacheck.commands import option_types as allowed
 from dnacheck.commands.common import (
     ModelSettings,
-    PositiveNumber,
     RunSettings,
     common_options,
     model_options,
     target_argument,
 )
+from dnacheck.commands.option_types import Count, Number
 from dnacheck.commands.output import note, print_json, progress
 
 if TYPE_CHECKING:
@@ -36,13 +37,17 @@ EXIT_NOT_CONVERGED = 3
 )
 @click.option(
     "--samples",
-    type=click.IntRange(min=20),
+    type=Count(allowed.SAMPLES),
     default=1500,
     show_default=True,
     help="Configurations kept of each replica.",
 )
 @click.option(
-    "--replicas", type=click.IntRange(min=1), default=2, show_default=True, help="Independent runs."
+    "--replicas",
+    type=Count(allowed.REPLICAS),
+    default=2,
+    show_default=True,
+    help="Independent runs.",
 )
 @click.option(
     "--integrator",
@@ -53,7 +58,7 @@ EXIT_NOT_CONVERGED = 3
 )
 @click.option(
     "--step-fraction",
-    type=PositiveNumber(),
+    type=Number(allowed.STEP_FRACTION),
     default=0.45,
     show_default=True,
     help="Time step over its limit of stability.",
@@ -106,9 +111,16 @@ EXIT_NOT_CONVERGED = 3
 @click.option(
     "--grooves", default="name GRV", show_default=True, help="Selection of the groove beads."
 )
-@click.option("--start", type=int, default=None, help="First frame of the trajectory to analyse.")
-@click.option("--stop", type=int, default=None, help="Frame to stop before.")
-@click.option("--step", type=int, default=None, help="Frames from one to the next.")
+@click.option(
+    "--start",
+    type=Count(allowed.FRAMES),
+    default=None,
+    help="First frame of the trajectory to analyse.",
+)
+@click.option("--stop", type=Count(allowed.FRAMES), default=None, help="Frame to stop before.")
+@click.option(
+    "--step", type=Count(allowed.FRAMES), default=None, help="Frames from one to the next."
+)
 @model_options
 @common_options
 def command(

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dnacheck.commands import option_types as allowed
 from dnacheck.commands.common import (
     ModelSettings,
-    PositiveNumber,
     RunSettings,
     common_options,
     model_options,
     target_argument,
 )
+from dnacheck.commands.option_types import Count, Number, integer, shown
 from dnacheck.commands.output import note, print_json, progress
 from dnacheck.cyclization.methods import METHODS, method_named
 
@@ -37,18 +38,17 @@ class LengthRange(click.ParamType):
         if isinstance(value, range):
             return value
         words = value.split(":")
-        try:
-            numbers = [int(word) for word in words]
-        except ValueError:
-            numbers = []
-        if len(numbers) not in (2, 3):
-            self.fail(f"{value!r} is not FIRST:LAST or FIRST:LAST:STEP, such as -12:12", param, ctx)
+        numbers = [number for word in words if (number := integer(word)) is not None]
+        if len(words) not in (2, 3) or len(numbers) != len(words):
+            self.fail(
+                f"{shown(value)} is not FIRST:LAST or FIRST:LAST:STEP, such as -12:12", param, ctx
+            )
         first, last = numbers[:2]
         step = numbers[2] if len(numbers) == 3 else 1
         if step < 1 or first > last or (last - first) // step >= _MOST_LENGTHS:
             self.fail(
-                f"{value!r}: FIRST must not exceed LAST, STEP is at least 1, and {_MOST_LENGTHS} "
-                "lengths are the most",
+                f"{shown(value)}: FIRST must not exceed LAST, STEP is at least 1, and "
+                f"{_MOST_LENGTHS} lengths are the most",
                 param,
                 ctx,
             )
@@ -68,7 +68,7 @@ class LengthRange(click.ParamType):
 @click.option(
     "--at",
     "place",
-    type=click.IntRange(min=0),
+    type=Count(allowed.POSITION),
     default=None,
     help="Base pair, from 0, before which they go in.  [default: the end]",
 )
@@ -84,7 +84,7 @@ class LengthRange(click.ParamType):
 )
 @click.option(
     "--tolerance",
-    type=PositiveNumber(),
+    type=Number(allowed.TOLERANCE),
     default=0.02,
     show_default=True,
     help="Standard error wanted on each ln J.",

@@ -107,8 +107,10 @@ def _solve(
 ) -> tuple[dict[str, Any], bool, Found]:
     """The JSON record of one molecule, whether every model asked for converged, and its rings."""
     from dnacheck.model.chain import build_chain
+    from dnacheck.model.ranges import check_link
 
     chain = build_chain(molecule, **model.chain_arguments())
+    check_link(ring.link, chain.n_steps)
     if structure is not None:
         from dnacheck.io.structure import structure_file
 

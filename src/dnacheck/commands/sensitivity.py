@@ -7,14 +7,15 @@ from typing import Any
 
 import click
 
+from dnacheck.commands import option_types as allowed
 from dnacheck.commands.common import (
     ModelSettings,
-    PositiveNumber,
     RunSettings,
     common_options,
     model_options,
     target_argument,
 )
+from dnacheck.commands.option_types import Count, Number
 from dnacheck.commands.output import note, print_json, progress
 
 
@@ -22,14 +23,14 @@ from dnacheck.commands.output import note, print_json, progress
 @target_argument
 @click.option(
     "--compute",
-    type=click.IntRange(min=0, max=100_000),
+    type=Count(allowed.COMPUTED),
     default=30,
     show_default=True,
     help="Substitutions computed anew, those with the largest predicted change.",
 )
 @click.option(
     "--tolerance",
-    type=PositiveNumber(),
+    type=Number(allowed.TOLERANCE),
     default=0.02,
     show_default=True,
     help="Standard error wanted on ln J.",

@@ -16,7 +16,9 @@ from dnacheck.commands.common import (
     model_options,
     target_argument,
 )
+from dnacheck.commands.option_types import integer, shown
 from dnacheck.commands.output import note, print_json, progress
+from dnacheck.model.ranges import TWIST_RATIO
 
 EXIT_NOT_CONVERGED = 3
 _MOST_RATIOS = 10_000
@@ -35,21 +37,21 @@ class RatioRange(click.ParamType):
         words = value.split(":")
         try:
             numbers = [float(word) for word in words[:2]]
-            count = int(words[2]) if len(words) == 3 else 1
         except ValueError:
-            self.fail(f"{value!r} is not FIRST:LAST:NUMBER, such as 0.5:1.5:16", param, ctx)
-        if len(words) not in (1, 3):
-            self.fail(f"{value!r} is not FIRST:LAST:NUMBER, such as 0.5:1.5:16", param, ctx)
+            numbers = []
+        count = integer(words[2]) if len(words) == 3 else 1
+        if not numbers or count is None or len(words) not in (1, 3):
+            self.fail(f"{shown(value)} is not FIRST:LAST:NUMBER, such as 0.5:1.5:16", param, ctx)
         for number in numbers:
-            if not 0.0 < number < float("inf"):
-                self.fail(f"ratio {number:g}: give numbers greater than 0", param, ctx)
+            if number not in TWIST_RATIO:
+                self.fail(f"ratio {number:g}: give numbers {TWIST_RATIO}", param, ctx)
         if len(words) == 1:
             return (numbers[0],)
         first, last = numbers
         if not (1 <= count <= _MOST_RATIOS) or (count > 1 and not first < last):
             self.fail(
-                f"{value!r}: the first ratio must lie below the last, and the number of ratios "
-                f"between 1 and {_MOST_RATIOS}",
+                f"{shown(value)}: the first ratio must lie below the last, and the number of "
+                f"ratios between 1 and {_MOST_RATIOS}",
                 param,
                 ctx,
             )

@@ -10,12 +10,10 @@ from typing import TypeVar
 
 import click
 
-from dnacheck.numerics.outcome import InputError, TimeLimitReachedError
+from dnacheck.numerics.outcome import TimeLimitReachedError
 
 Result = TypeVar("Result")
 
-LONGEST_SECONDS = 1e6
-"""Largest limit that every operating system's timed wait takes: twelve days."""
 LEFT_BEHIND = "left behind"
 """Name of a thread that goes on after its result was given up."""
 _MARGIN = 0.02
@@ -39,17 +37,11 @@ def within(max_seconds: float | None, work: Callable[[float], Result]) -> Result
 
     Raises
     ------
-    InputError
-        The limit is longer than any command runs.
     TimeLimitReachedError
         The limit came before the result.
     """
     if max_seconds is None:
         return work(math.inf)
-    if max_seconds > LONGEST_SECONDS:
-        raise InputError(
-            f"--max-seconds {max_seconds:g}: the longest limit is {LONGEST_SECONDS:g}; leave it out"
-        )
     left = max_seconds - (time.perf_counter() - _start())
     outcome: list[Result] = []
     failure: list[BaseException] = []

@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dnacheck.model import ranges
 from dnacheck.model.a_tracts import (
     Region,
     automatic_regions,
@@ -100,12 +101,9 @@ class Chain:
             )
         if not (np.all(np.isfinite(ground)) and np.all(np.isfinite(stiffness))):
             raise InputError("ground angles and stiffnesses must be finite")
-        for value, name in (
-            (self.persistence_length_A, "persistence length"),
-            (self.rise_A, "rise"),
-        ):
-            if not (np.isfinite(value) and value > 0.0):
-                raise InputError(f"{name} must be a positive number of Å, not {value}")
+        if not self.rigid:
+            ranges.PERSISTENCE_LENGTH_A.checked(self.persistence_length_A, "persistence length")
+        ranges.RISE_A.checked(self.rise_A, "rise")
         ground.setflags(write=False)
         stiffness.setflags(write=False)
         object.__setattr__(self, "ground", ground)
@@ -199,10 +197,9 @@ def uniform_stiffness(n_steps: int, twist_ratio: float) -> Array:
     Raises
     ------
     InputError
-        The ratio is not a positive finite number.
+        The ratio lies outside :data:`dnacheck.model.ranges.TWIST_RATIO`.
     """
-    if not (np.isfinite(twist_ratio) and twist_ratio > 0.0):
-        raise InputError(f"twist ratio must be a positive number, not {twist_ratio}")
+    ranges.TWIST_RATIO.checked(float(twist_ratio), "twist ratio")
     return np.tile(np.diag([float(twist_ratio), 1.0, 1.0]), (n_steps, 1, 1))
 
 
