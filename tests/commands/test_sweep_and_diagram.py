@@ -43,6 +43,7 @@ def test_sweep_table_and_picture(capsys, tmp_path):
     ("ratios", "message"),
     [
         ("0:1:3", "from 0.01 to 100"),
+        ("1e-300:1:3", "from 0.01 to 100"),
         ("-0.5:1:3", "from 0.01 to 100"),
         ("1:0.5:3", "below the last"),
         ("0.5:1.5", "FIRST:LAST:NUMBER"),

@@ -225,6 +225,7 @@ def _continuum(
     )
     warnings += [f"continuum: {text}" for text in rod.warnings]
     found = lowest_continuum_ring(rod, ring.link)
+    warnings += [f"continuum: {text}" for text in found.notes]
     entries = [item.to_dict() for item in found]
     if not found.minima:
         warnings.append(f"continuum: {found.reason}")

@@ -80,3 +80,11 @@ def test_wide_sample_of_random_sequences():
         assert ring.residual < 1e-10
         above = ring.energy / find_rings(chain).lowest.energy - 1.0
         assert above < (0.05 if ratio > 0.3 else 0.15)
+
+
+def test_a_bound_on_the_links_is_said():
+    soft = build_rod(random_chain(3, 150, ratio=0.01))
+    found = lowest_continuum_ring(soft)
+    assert len(found.links_searched) == 13
+    assert found.notes == ("only the 13 links nearest to the relaxed twist were searched",)
+    assert lowest_continuum_ring(molecule_rod("11T15")).notes == ()

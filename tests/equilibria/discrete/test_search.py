@@ -139,3 +139,11 @@ def test_half_a_turn_of_excess_has_two_nearly_equal_links():
 def test_bad_links_are_refused(links):
     with pytest.raises(InputError, match="link must be"):
         SearchOptions(links=links)
+
+
+def test_a_bound_on_the_links_is_said():
+    rng = np.random.default_rng(17)
+    soft = random_chain(rng, 400, 400, 0.01)
+    found = find_rings(Chain("soft", soft.ground, soft.stiffness, persistence_length_A=30.0))
+    assert len(found.links_searched) <= 64
+    assert any("only the 64 links nearest" in note for note in found.notes)

@@ -33,13 +33,17 @@ def candidate_links(rod: Rod) -> tuple[int, ...]:
     The two around the relaxed twist, and every other whose twisting energy as a flat ring stays
     within 8 RT or half the bending energy of a circle; 13 at most.
     """
+    return _links_in_reach(rod)[:_MOST_LINKS]
+
+
+def _links_in_reach(rod: Rod) -> tuple[int, ...]:
     turns = rod.relaxed_turns
     allowed = max(_WINDOW_RT / rod.energy_scale_RT, np.pi**2 * rod.bend_stiffness)
     reach = float(np.sqrt(2.0 * allowed / rod.twist_stiffness)) / (2.0 * np.pi)
-    reach = min(max(reach, 1.0), float(_MOST_LINKS))
+    reach = min(max(reach, 1.0), float(_MOST_LINKS) + 1.0)
     around = range(int(np.floor(turns - reach)), int(np.ceil(turns + reach)) + 1)
     inside = (link for link in around if abs(link - turns) <= reach)
-    return tuple(sorted(inside, key=lambda link: abs(link - turns))[:_MOST_LINKS])
+    return tuple(sorted(inside, key=lambda link: abs(link - turns)))
 
 
 def lowest_continuum_ring(
@@ -118,6 +122,9 @@ def lowest_continuum_ring(
     minima = any(ring.stable is not False for ring in kept)
     status = Status.CONVERGED if minima else Status.NOT_FOUND
     elsewhere = tuple(ring for ring in found if one is not None and ring.link != one)
+    notes: tuple[str, ...] = ()
+    if kept and links == "auto" and len(_links_in_reach(rod)) > _MOST_LINKS:
+        notes = (f"only the {_MOST_LINKS} links nearest to the relaxed twist were searched",)
     return Equilibria(
         source=rod,
         equilibria=kept,
@@ -127,6 +134,7 @@ def lowest_continuum_ring(
         seconds=time.perf_counter() - began,
         status=status,
         ends=(*elsewhere, *failures),
+        notes=notes,
     )
 
 
