@@ -166,3 +166,15 @@ def test_scan_refuses_what_it_cannot_read_or_write(capsys, tmp_path):
     code, _, err = run(capsys, "scan", str(source), "-o", str(tmp_path / "absent" / "o.csv"))
     assert code == 2
     assert "cannot write" in err
+
+
+def test_binding_prints_the_ratio_of_binding_constants(capsys):
+    code, out, _ = run(capsys, "jfactor", "11T15", "--bind", "125=cap", "--method", "laplace")
+    assert code == 0
+    assert "binding constant, ring over linear" in out
+    code, out, _ = run(
+        capsys, "jfactor", "11T15", "--bind", "125=cap", "--method", "laplace", "--json"
+    )
+    linkage = json.loads(out)["binding"]
+    assert linkage["guests"] == [{"name": "CAP", "site": 125}]
+    assert linkage["ratio"] == pytest.approx(math.exp(linkage["ln_ratio"]))

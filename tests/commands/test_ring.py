@@ -176,3 +176,33 @@ def test_structure_that_cannot_be_written_leaves_nothing(tmp_path):
             tmp_path / "missing" / "ring.pdb", centres, frames, chain.letters, 3.4, "x"
         )
     assert not list(tmp_path.iterdir())
+
+
+def test_a_bound_ring_is_reported_with_its_guests(capsys):
+    code = cli.main(["ring", "11T15", "--bind", "125=cap", "--json"])
+    out = capsys.readouterr().out
+    record = json.loads(out)
+    assert code == 0
+    assert record["guests"] == [{"name": "CAP", "site": 125, "steps": [120, 130]}]
+    assert {item["model"] for item in record["equilibria"]} == {"discrete"}
+    assert any("holds no guests" in text for text in record["warnings"])
+
+
+@pytest.mark.parametrize(
+    ("bind", "what"),
+    [
+        (["200=cap"], "site 200 lies outside"),
+        (["cap"], "is not SITE=FILE"),
+        (["3=nothing.par"], "nothing.par"),
+        (["20=cap", "30=cap"], "held by both"),
+        (["20=roll=40"], "no steps after @"),
+    ],
+)
+def test_what_cannot_be_bound_is_bad_input(capsys, bind, what):
+    arguments = [part for text in bind for part in ("--bind", text)]
+    code = cli.main(["ring", "11T15", *arguments])
+    captured = capsys.readouterr()
+    assert code == 2
+    assert captured.out == ""
+    assert len(captured.err.strip().splitlines()) == 1
+    assert what in captured.err

@@ -223,6 +223,19 @@ def ends_option(name: str) -> Callable[[Function], Function]:
     )
 
 
+def bind_option(function: Function) -> Function:
+    """Give a command ``--bind``; it receives ``bind``, a tuple of SITE=SOURCE."""
+    return click.option(
+        "--bind",
+        "bind",
+        metavar="SITE=FILE",
+        multiple=True,
+        help="Hold steps at a bound protein's values: SITE is the step, from 0, that is its step "
+        "0; FILE a 3DNA .par file, a TOML file, a bundled guest (cap, nucleosome) or a kink such "
+        "as roll=40@-5,5. May be given more than once.",
+    )(function)
+
+
 def ring_options(function: Function) -> Function:
     """Give a command ``--model``, ``--link`` and ``--ends``; it receives ``ring``."""
     return _gathered(

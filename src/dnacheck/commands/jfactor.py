@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -9,9 +10,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dnacheck.commands import option_types as allowed
+from dnacheck.commands.binding import with_guests
 from dnacheck.commands.common import (
     ModelSettings,
     RunSettings,
+    bind_option,
     common_options,
     model_options,
     target_argument,
@@ -22,6 +25,7 @@ from dnacheck.commands.time_limit import within
 from dnacheck.cyclization.methods import METHODS, method_named
 
 if TYPE_CHECKING:
+    from dnacheck.cyclization.binding import Binding
     from dnacheck.cyclization.result import JFactor
     from dnacheck.model.chain import Chain
 
@@ -55,6 +59,7 @@ EXIT_NOT_CONVERGED = 3
     "--link", type=LinkChoice(), default="auto", show_default=True, help="Links to search."
 )
 @model_options
+@bind_option
 @common_options
 def command(
     target: str,
@@ -63,6 +68,7 @@ def command(
     max_seconds: float | None,
     link: Any,
     model: ModelSettings,
+    bind: tuple[str, ...],
     run: RunSettings,
 ) -> int | None:
     """J factor of TARGET: the molar density of exact closure, entropy included, nothing fitted.
@@ -88,10 +94,10 @@ def command(
             refused = True
             continue
         began = time.perf_counter()
-        chain = build_chain(molecule, **model.chain_arguments())
+        chain = with_guests(build_chain(molecule, **model.chain_arguments()), bind)
         check_link(link, chain.n_steps)
 
-        def compute(left: float, chain: Chain = chain) -> JFactor:
+        def compute(left: float, chain: Chain = chain) -> tuple[JFactor, Binding | None]:
             searching = time.perf_counter()
             search = find_rings(chain, SearchOptions(links=link))
             if isinstance(link, int):
@@ -104,12 +110,25 @@ def command(
                     threads=run.threads,
                     progress=_by_difference(advance),
                     tolerance=tolerance,
-                    max_seconds=max(left - (time.perf_counter() - searching), 1e-3),
+                    # A bound molecule leaves half of the time to the free one.
+                    max_seconds=max(
+                        left * (0.5 if chain.guests else 1.0) - (time.perf_counter() - searching),
+                        1e-3,
+                    ),
                 )
-            return result.of_link(link, tolerance) if isinstance(link, int) else result
+            if isinstance(link, int):
+                result = result.of_link(link, tolerance)
+            if not chain.guests:
+                return result, None
+            from dnacheck.cyclization.binding import binding
+            from dnacheck.cyclization.method import Run
+
+            rest = max(left - (time.perf_counter() - searching), 1e-3)
+            asked = Run(run.seed, run.threads, None, tolerance, rest)
+            return result, binding(chain, way, asked, SearchOptions(links=link), result)
 
         try:
-            result = within(max_seconds, compute)
+            result, linkage = within(max_seconds, compute)
         except (SolveError, TimeLimitReachedError) as error:
             if run.json and len(molecules) == 1:
                 raise
@@ -119,8 +138,13 @@ def command(
             continue
         records.append(result.to_dict())
         good = good and (result.status.ok or not way.measures_error)
+        if linkage is not None:
+            records[-1]["binding"] = linkage.to_dict()
+            good = good and (linkage.free.status.ok or not way.measures_error)
         if not run.json:
             _print(result)
+            if linkage is not None:
+                _print_binding(linkage)
             for warning in result.warnings:
                 note(f"{chain.name}: {warning}", run.quiet)
     if run.json:
@@ -156,6 +180,22 @@ def _by_difference(advance: Callable[[int], None]) -> Callable[[int], None]:
         made = total
 
     return drawn
+
+
+def _print_binding(linkage: Binding) -> None:
+    """What binding does to the ring, for a reader."""
+    names = ", ".join(f"{name} at site {site}" for name, site in linkage.guests)
+    low, high = (math.exp(linkage.ln_ratio + sign * linkage.stderr) for sign in (-1.0, 1.0))
+    print(f"  bound: {names}")
+    print(f"  free molecule: -ln J = {linkage.free.minus_lnJ:.3f} ± {linkage.free.stderr:.3f}")
+    print(
+        f"  binding constant, ring over linear: {linkage.ratio:.4g} ({low:.4g} to {high:.4g}); "
+        f"ln {linkage.ln_ratio:.3f} ± {linkage.stderr:.3f}"
+    )
+    print(
+        f"  middle of the ring from the major groove at the site: {linkage.facing_free_deg:.0f}° "
+        f"free, {linkage.facing_bound_deg:.0f}° bound ({linkage.register_change_deg:+.0f}°)"
+    )
 
 
 def _print(result: JFactor) -> None:

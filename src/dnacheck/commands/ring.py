@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dnacheck.commands.binding import with_guests
 from dnacheck.commands.common import (
     ContinuumSettings,
     ModelSettings,
     RingSettings,
     RunSettings,
+    bind_option,
     common_options,
     continuum_options,
     model_options,
@@ -48,6 +50,7 @@ _SOFT_RT = 5.0
 @model_options
 @ring_options
 @continuum_options
+@bind_option
 @common_options
 def command(
     target: str,
@@ -55,6 +58,7 @@ def command(
     model: ModelSettings,
     ring: RingSettings,
     continuum: ContinuumSettings,
+    bind: tuple[str, ...],
     run: RunSettings,
 ) -> int | None:
     """Closed rings of TARGET: energies, link, writhe and stability, lowest first.
@@ -80,7 +84,7 @@ def command(
             if isinstance(molecule, InputError):
                 note(str(molecule))
                 continue
-            record, converged, found = _solve(molecule, structure, model, ring, continuum)
+            record, converged, found = _solve(molecule, structure, model, ring, continuum, bind)
             complete = complete and converged
             records.append(record)
             advance(1)
@@ -104,12 +108,13 @@ def _solve(
     model: ModelSettings,
     ring: RingSettings,
     continuum: ContinuumSettings,
+    bind: tuple[str, ...],
 ) -> tuple[dict[str, Any], bool, Found]:
     """The JSON record of one molecule, whether every model asked for converged, and its rings."""
     from dnacheck.model.chain import build_chain
     from dnacheck.model.ranges import check_link
 
-    chain = build_chain(molecule, **model.chain_arguments())
+    chain = with_guests(build_chain(molecule, **model.chain_arguments()), bind)
     check_link(ring.link, chain.n_steps)
     if structure is not None:
         from dnacheck.io.structure import structure_file
@@ -119,6 +124,8 @@ def _solve(
     if chain.rigid and ring.model == "both":
         warnings.append("continuum: left out, for steps of six parameters have none yet")
         ring = replace(ring, model="discrete")
+    if chain.guests:
+        ring = _without_continuum(ring, warnings)
     if ring.ends != "ring":
         ring = _discrete_only(ring, warnings)
     equilibria: list[dict[str, Any]] = []
@@ -148,11 +155,26 @@ def _solve(
         "persistence_length_A": None if chain.rigid else chain.persistence_length_A,
         "rise_A": chain.rise_A,
         "strand": chain.letters,
+        "guests": [
+            {"name": guest.name, "site": guest.site, "steps": list(guest.steps)}
+            for guest in chain.guests
+        ],
         "equilibria": equilibria,
         "comparison": comparison,
         "warnings": warnings,
     }
     return record, converged, (chain, smooth, discrete)
+
+
+def _without_continuum(ring: RingSettings, warnings: list[str]) -> RingSettings:
+    """The settings for a chain with guests, which the continuum rod does not know."""
+    from dnacheck.numerics.outcome import InputError
+
+    if ring.model == "continuum":
+        raise InputError("--model continuum: the rod holds no guests; give --model discrete")
+    if ring.model == "both":
+        warnings.append("continuum: left out, for the rod holds no guests")
+    return replace(ring, model="discrete")
 
 
 def _discrete_only(ring: RingSettings, warnings: list[str]) -> RingSettings:
@@ -273,6 +295,9 @@ def _print(record: dict[str, Any]) -> None:
     # No column may be cut where the output is not a terminal, or a narrow one.
     console = Console(highlight=False, soft_wrap=True, width=120)
     console.print(table)
+    for guest in record["guests"]:
+        held = len(guest["steps"])
+        console.print(f"bound: {guest['name']} at site {guest['site']}, {held} steps held")
     if record["comparison"] is not None:
         gap = record["comparison"]["energy_difference_percent"]
         rms = record["comparison"]["rms_A"]

@@ -105,6 +105,7 @@ class BeadChain:
         if measure not in (None, "frames", "angles"):
             raise InputError(f"measure '{measure}' is neither frames nor angles")
         chain.require_hinges("the bead chain")
+        chain.require_free("the bead chain")
         if closed and chain.n_steps < 6:
             raise InputError(f"a closed bead chain needs 6 base pairs or more, not {chain.n_steps}")
         self.chain = chain

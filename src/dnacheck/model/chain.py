@@ -7,7 +7,7 @@ six parameters of a rigid base-pair step.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -22,7 +22,14 @@ from dnacheck.model.a_tracts import (
     region_steps,
     tract_regions,
 )
-from dnacheck.model.chain_kernels import MIDSTEP, WEDGE, HingeSteps, fill_angles, fill_frames
+from dnacheck.model.chain_kernels import (
+    BOUND_STIFFNESS,
+    MIDSTEP,
+    WEDGE,
+    HingeSteps,
+    fill_angles,
+    fill_frames,
+)
 from dnacheck.model.molecules import Molecule
 from dnacheck.model.parameters import ParameterSet, load_parameters
 from dnacheck.model.rigid_kernels import (
@@ -43,6 +50,28 @@ RISE_A = 3.4
 """Helix rise per base pair of Section X, in Å."""
 TWIST_RATIO = 1.5
 """K_tau / K_theta of Table II."""
+
+
+@dataclass(frozen=True)
+class Guest:
+    """A protein, or any other rigid insert, that holds steps of a chain.
+
+    Attributes
+    ----------
+    name : str
+    site : int
+        Step of the chain that the guest's step 0 is.
+    steps : tuple of int
+        Steps of the chain that it holds.
+    ground, stiffness : ndarray, shapes (n, c) and (n, c, c)
+        What those steps were before it bound.
+    """
+
+    name: str
+    site: int
+    steps: tuple[int, ...]
+    ground: Array = field(repr=False)
+    stiffness: Array = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -74,6 +103,9 @@ class Chain:
     a_tract_regions : tuple of (first, last)
         Steps that took the A-tract twist, from 0, both ends included; of a region that goes on
         across the first base pair the first step comes after the last.
+    guests : tuple of Guest
+        What is bound (:func:`dnacheck.model.guests.bind`). The steps that guests hold stay at
+        their ``ground`` values and cost no energy; their ``stiffness`` is without bound.
     """
 
     name: str
@@ -86,6 +118,7 @@ class Chain:
     twist_ratio: float | None = None
     step_form: StepForm = "wedge"
     a_tract_regions: tuple[Region, ...] = ()
+    guests: tuple[Guest, ...] = ()
     warnings: tuple[str, ...] = field(default=())
 
     def __post_init__(self) -> None:
@@ -137,6 +170,55 @@ class Chain:
                 "with three angles, such as trifonov2"
             )
 
+    @cached_property
+    def bound(self) -> NDArray[np.bool_]:
+        """Which steps (N,) a guest holds."""
+        held = np.zeros(self.n_steps, dtype=np.bool_)
+        for guest in self.guests:
+            held[list(guest.steps)] = True
+        return held
+
+    @property
+    def n_free(self) -> int:
+        """Number of steps that no guest holds."""
+        return self.n_steps - int(self.bound.sum())
+
+    @cached_property
+    def flexibility(self) -> Array:
+        """Inverse of the stiffness of each step (N, c, c), 0 for steps that a guest holds."""
+        inverse = np.zeros_like(self.stiffness)
+        inverse[~self.bound] = np.linalg.inv(self.stiffness[~self.bound])
+        return inverse
+
+    def elastic(self, share: float = 1.0) -> Chain:
+        """The same chain with every step elastic again.
+
+        Parameters
+        ----------
+        share : float
+            Of the way from a held step's own unstressed coordinates, 0, to those at which its
+            guest holds it, 1; the step takes them as its unstressed ones.
+        """
+        ground, stiffness = self.ground.copy(), self.stiffness.copy()
+        for guest in self.guests:
+            steps = list(guest.steps)
+            ground[steps] = guest.ground + share * (ground[steps] - guest.ground)
+            stiffness[steps] = guest.stiffness
+        return replace(self, ground=ground, stiffness=stiffness, guests=())
+
+    def require_free(self, what: str) -> None:
+        """Refuse a chain with bound guests where ``what`` knows elastic steps alone.
+
+        Raises
+        ------
+        InputError
+        """
+        if self.guests:
+            raise InputError(
+                f"{what} is not available for a chain that holds {self.guests[0].name}; leave out "
+                "what is bound"
+            )
+
     @property
     def form_code(self) -> int:
         """Integer of the form of three-angle steps, for compiled kernels.
@@ -182,13 +264,12 @@ class Chain:
         """
         if self.twist_ratio is None:
             raise InputError("a twist ratio applies only to the uniform diagonal stiffness")
-        from dataclasses import replace
-
-        return replace(
-            self,
-            stiffness=uniform_stiffness(self.n_steps, twist_ratio),
-            twist_ratio=float(twist_ratio),
+        stiffness = uniform_stiffness(self.n_steps, twist_ratio)
+        guests = tuple(
+            replace(guest, stiffness=stiffness[list(guest.steps)]) for guest in self.guests
         )
+        stiffness[self.bound] = BOUND_STIFFNESS * np.eye(3)
+        return replace(self, stiffness=stiffness, twist_ratio=float(twist_ratio), guests=guests)
 
 
 def uniform_stiffness(n_steps: int, twist_ratio: float) -> Array:

@@ -14,6 +14,13 @@ from dnacheck.numerics.trigonometry import arctangents
 WEDGE = 0
 MIDSTEP = 1
 
+BOUND_STIFFNESS = 1e30
+"""Diagonal of the stiffness of a step that a guest holds: it gives way to nothing.
+
+Kernels leave such steps out of the unknowns (:func:`is_bound`); the number itself enters nothing.
+"""
+_BOUND_FROM = 1e25
+
 
 class HingeSteps(NamedTuple):
     """Elastic steps of three angles about a pivot, as compiled kernels read them.
@@ -31,6 +38,12 @@ class HingeSteps(NamedTuple):
     ground: Any
     stiffness: Any
     form: int
+
+
+@njit(cache=True, nogil=True)
+def is_bound(stiffness: Any, s: int) -> bool:
+    """Whether a guest holds step ``s`` at its ground values."""
+    return stiffness[s, 0, 0] >= _BOUND_FROM
 
 
 # Products of rotations drift from orthonormality by about one rounding error a step; one

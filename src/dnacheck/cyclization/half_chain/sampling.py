@@ -115,8 +115,11 @@ class HalfSampler:
     """Draws the halves of one side of the joint."""
 
     def __init__(self, chain: Chain, tilts: tuple[Tilt, ...], steps: slice, tilted: bool) -> None:
-        stiffness = chain.energy_scale_RT * chain.stiffness[steps]
-        self.roots = np.linalg.cholesky(np.linalg.inv(stiffness))
+        free = ~chain.bound[steps]
+        self.roots = np.zeros_like(chain.stiffness[steps])
+        self.roots[free] = np.linalg.cholesky(
+            chain.flexibility[steps][free] / chain.energy_scale_RT
+        )
         self.ground = np.ascontiguousarray(chain.ground[steps])
         self.centres = [np.ascontiguousarray(tilt.angles[steps]) for tilt in tilts]
         self.pulls = np.array([tilt.pull[steps] for tilt in tilts])

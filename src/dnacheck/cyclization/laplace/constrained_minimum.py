@@ -114,7 +114,7 @@ class Constrainer:
     def __init__(self, chain: Chain, link: int, options: RegisterOptions) -> None:
         self.chain, self.link, self.options = chain, link, options
         self.steps = steps_in_RT(chain)
-        self.flexibility = np.ascontiguousarray(np.linalg.inv(self.steps.stiffness))
+        self.flexibility = chain.flexibility / chain.energy_scale_RT
         n = chain.n_steps
         self.along, self.across = np.empty((n, 3)), np.empty((n, 3))
         rk.register_functionals(chain.ground, chain.form_code, link, self.along, self.across)
@@ -122,7 +122,7 @@ class Constrainer:
         self.constant = (
             log_prefactor(chain)
             - 3.0 * math.log(scale / (2.0 * math.pi))
-            + 1.5 * n * math.log(scale)
+            + 1.5 * chain.n_free * math.log(scale)
             - 3.5 * math.log(2.0 * math.pi)
         )
 

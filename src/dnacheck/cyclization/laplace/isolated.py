@@ -41,7 +41,7 @@ beyond it the Gaussian differs from the integral over the register by 0.1 to 0.5
 def log_prefactor(chain: Chain) -> float:
     """ln of 8 pi^2 sqrt(det K) (s / 2 pi)^3 / l^3 in mol/L, K reduced; see the module's text."""
     scale = chain.energy_scale_RT / (2.0 * math.pi)
-    log_det_stiffness = float(np.linalg.slogdet(chain.stiffness)[1].sum())
+    log_det_stiffness = float(np.linalg.slogdet(chain.stiffness[~chain.bound])[1].sum())
     return (
         math.log(8.0 * math.pi**2)
         + 0.5 * log_det_stiffness

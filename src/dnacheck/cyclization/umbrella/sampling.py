@@ -160,6 +160,7 @@ class _Ladders:
     """Everything that the copies of a ladder share."""
 
     def __init__(self, chain: Chain, tilts: tuple[Tilt, ...], options: UmbrellaOptions) -> None:
+        chain.require_free("umbrella sampling")
         self.chain, self.tilts, self.options = chain, tilts, options
         self.length = chain.n_steps / (2.0 * math.pi)
         self.ground = np.ascontiguousarray(chain.ground)

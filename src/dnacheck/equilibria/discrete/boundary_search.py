@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from dnacheck.equilibria.boundary import AnyBoundary, HingedRing, Loop, NickedRing, Pull
+from dnacheck.equilibria.discrete.bound_search import hold_found
 from dnacheck.equilibria.discrete.kernels.search import fill_start, predicted_registers
 from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
 from dnacheck.equilibria.discrete.solve import NewtonOptions, solve_ring
@@ -59,6 +60,10 @@ def find_equilibria(
         raise InputError(
             f"link {options.links}: a {boundary.label} chain has no link; leave it out, or close "
             "the chain to a ring"
+        )
+    if chain.guests:
+        return hold_found(
+            chain, boundary, options.newton, lambda soft: find_equilibria(soft, boundary, options)
         )
     began = time.perf_counter()
     newton = NewtonOptions(

@@ -24,7 +24,7 @@ from dnacheck.equilibria.discrete.kernels.search import (
     fill_start,
     search,
 )
-from dnacheck.equilibria.discrete.solve import NewtonOptions, make_ring, solve_ring
+from dnacheck.equilibria.discrete.solve import RING, NewtonOptions, make_ring, solve_ring
 from dnacheck.equilibria.ring import Equilibria, Equilibrium
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import InputError, Status
@@ -137,6 +137,10 @@ def find_rings(chain: Chain, options: SearchOptions | None = None) -> Equilibria
     and no start rests at it, a ring that is relaxed there is given its twist step by step.
     """
     options = options or SearchOptions()
+    if chain.guests:
+        from dnacheck.equilibria.discrete.bound_search import hold_found
+
+        return hold_found(chain, RING, options.newton, lambda soft: find_rings(soft, options))
     found = _searched(chain, search_plan(chain, options.links), options.newton)
     if options.links == "auto" and len(_links_in_reach(chain)) > _MOST_LINKS:
         text = f"only the {_MOST_LINKS} links nearest to the ground twist were searched"

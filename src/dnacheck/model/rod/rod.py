@@ -209,6 +209,7 @@ def build_rod(chain: Chain, options: RodOptions | None = None, cut: int | None =
     """
     options = RodOptions() if options is None else options
     chain.require_hinges("the continuum rod")
+    chain.require_free("the continuum rod")
     n = chain.n_steps
     require_positive(chain.stiffness)
     cut = int(least_rotation(chain.arrays)) if cut is None else cut % n

@@ -24,7 +24,7 @@ import numpy as np
 from numba import njit
 
 from dnacheck.equilibria.discrete.kernels.factorisation import coupling, midstep_block
-from dnacheck.model.chain_kernels import WEDGE
+from dnacheck.model.chain_kernels import WEDGE, is_bound
 
 ROWS = 7
 """Constraint rows of a slice: displacement (3), rotation (3), register (1)."""
@@ -180,7 +180,8 @@ def factorise_slice(
     rows : (N, 3, 8) of :func:`constraint_rows`. penalty : R, (7, 7).
     right : (N, 3, 7), filled with the right generators R g + (0, e, 0).
     z : (N, 3, 7), filled with D^-1 (g - right P). root : (N, 6), filled with the inverse of the
-        lower Cholesky factor of D, packed as (00, 10, 11, 20, 21, 22).
+        lower Cholesky factor of D, packed as (00, 10, 11, 20, 21, 22). Steps that a guest holds
+        have none: all three are zero, and so is what they solve and draw.
     """
     n = rows.shape[0]
     p = np.zeros((ROWS, ROWS))
@@ -191,6 +192,9 @@ def factorise_slice(
     rg = np.empty((3, ROWS))
     log_det = 0.0
     for s in range(n):
+        if is_bound(stiffness, s):
+            right[s], z[s], root[s] = 0.0, 0.0, 0.0
+            continue
         x = centres[n, 0] - centres[s + 1, 0]
         y = centres[n, 1] - centres[s + 1, 1]
         zz = centres[n, 2] - centres[s + 1, 2]
@@ -352,7 +356,7 @@ def draw_closed(rng: Any, factors: Any, normals: Any, out: Any) -> float:
     quadratic = 0.0
     for s in range(normals.shape[0]):
         for k in range(3):
-            value = rng.standard_normal()
+            value = rng.standard_normal() if factors.root[s, 0] > 0.0 else 0.0
             normals[s, k] = value
             quadratic += value * value
     draw_slice(factors.right, factors.z, factors.root, normals, out)

@@ -32,7 +32,8 @@ from dnacheck.equilibria.discrete.kernels.registers import (
     register_functionals as register_functionals,
 )
 from dnacheck.equilibria.discrete.kernels.registers import register_of as register_of
-from dnacheck.model.chain_kernels import WEDGE
+from dnacheck.equilibria.discrete.kernels.states import hold_ground, still_axes
+from dnacheck.model.chain_kernels import WEDGE, is_bound
 
 FOUND = 0
 NOT_CONVERGED = 1
@@ -108,6 +109,7 @@ def constrained_minimum(
     halves = np.empty((n if form != WEDGE else 0, 5, 3))
     gradient = np.empty((n, 3))
     row = np.empty((n, 3))
+    moving = np.empty((n, 3))
     rows = np.zeros((n, 3, WIDTH))
     columns = np.empty((n, 3, WIDTH))
     solved = np.empty((n, 3, WIDTH))
@@ -121,11 +123,14 @@ def constrained_minimum(
     for s in range(n):
         for j in range(3):
             row[s, j] = c * across[s, j] - sn * along[s, j]
+            moving[s, j] = 0.0 if is_bound(steps.stiffness, s) else row[s, j]
+    hold_ground(steps, angles)
     for iteration in range(problem.most + 1):
         linearise(angles, form, centres, frames, axes, halves)
+        still_axes(steps.stiffness, axes)
         energy = energy_gradient(angles, steps.ground, steps.stiffness, gradient)
         closure_residual(centres, frames, closure)
-        constraint_rows(centres, axes, row, rows)
+        constraint_rows(centres, axes, moving, rows)
         closure[6] = 0.0
         extent = 0.0
         worst = 0.0

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from dnacheck.model.chain_kernels import WEDGE
+from dnacheck.model.chain_kernels import WEDGE, is_bound
 from dnacheck.numerics.vectors import combine, cross, dot, less_product, plus
 
 FACTOR_WIDTH = 36
@@ -99,6 +99,7 @@ def factorise(
         added to the Lagrangian (0 for the true Hessian). Between angles of steps s <= t it adds
         shift (N - t)/N a_s . a_t, which has the same semi-separable form, so it is free; it
         holds back rolling and reorientation, which the elastic energy hardly resists.
+    stiffness : (N, 3, 3); steps that a guest holds have no pivots.
     factors : (N, FACTOR_WIDTH), filled.
     small : (6, 7), filled: G H^-1 G^T and, in the last column, G H^-1 gradient.
 
@@ -125,6 +126,10 @@ def factorise(
     product = 1.0
     weakest = 1e300
     for s in range(n):
+        if is_bound(stiffness, s):
+            for k in range(FACTOR_WIDTH):
+                factors[s, k] = 0.0
+            continue
         held = shift * (n - s) / n
         d = (end[0] - centres[s + 1, 0], end[1] - centres[s + 1, 1], end[2] - centres[s + 1, 2])
         a0, a1, a2 = _vector(axes, s, 0), _vector(axes, s, 1), _vector(axes, s, 2)

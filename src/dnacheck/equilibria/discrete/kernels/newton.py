@@ -21,10 +21,12 @@ from dnacheck.equilibria.discrete.kernels.registers import KnownRegister, is_nea
 from dnacheck.equilibria.discrete.kernels.states import (
     accumulated_turn,
     evaluate,
+    hold_ground,
     new_factors,
     new_state,
     substitute,
 )
+from dnacheck.model.chain_kernels import is_bound
 
 CONVERGED = 0
 ITERATION_LIMIT = 1
@@ -142,8 +144,12 @@ def newton_away(
     change = np.empty(6)
     target = np.empty(6)
     mean_bend = 0.0
+    free = 0
     for s in range(n):
-        mean_bend += 0.5 * (stiffness[s, 1, 1] + stiffness[s, 2, 2]) / n
+        if not is_bound(stiffness, s):
+            mean_bend += 0.5 * (stiffness[s, 1, 1] + stiffness[s, 2, 2])
+            free += 1
+    mean_bend /= free
     # Energy of a bent circle over its length: the scale on which rolling costs energy.
     unit = 2.0 * math.pi * math.pi * mean_bend / n
     flat = _FLAT * unit
@@ -151,6 +157,7 @@ def newton_away(
     escapes = 0
 
     state.angles[:] = angles
+    hold_ground(steps, state.angles)
     for s in range(n):
         state.turn[0] += angles[s, 0]
     energy = evaluate(state, steps)

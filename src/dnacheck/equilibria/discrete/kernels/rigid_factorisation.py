@@ -22,6 +22,7 @@ from typing import Any
 
 from numba import njit
 
+from dnacheck.model.chain_kernels import is_bound
 from dnacheck.model.rigid_kernels import RigidKinematics
 from dnacheck.numerics.vectors import (
     combine,
@@ -142,6 +143,10 @@ def factorise_rigid(
     running = 1.0
     weakest = 1e300
     for s in range(n):
+        if is_bound(stiffness, s):
+            for k in range(RIGID_FACTOR_WIDTH):
+                factors[s, k] = 0.0
+            continue
         held = shift * (n - s) / n
         d = (
             centres[n, 0] - centres[s + 1, 0],

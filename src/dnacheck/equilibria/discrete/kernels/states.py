@@ -40,7 +40,7 @@ from dnacheck.equilibria.discrete.kernels.rigid_factorisation import (
     eliminate_rigid,
     factorise_rigid,
 )
-from dnacheck.model.chain_kernels import HingeSteps, fill_angles
+from dnacheck.model.chain_kernels import HingeSteps, fill_angles, is_bound
 from dnacheck.model.rigid_kernels import (
     RigidSteps,
     fill_rigid_coordinates,
@@ -183,10 +183,31 @@ new_factors = by_kind(_hinge_factors, _rigid_factors)
 
 
 @njit(cache=True, nogil=True)
+def still_axes(stiffness: Any, axes: Any) -> None:
+    """Clear the ``axes`` of steps that a guest holds: nothing turns about them.
+
+    Everything that is made of axes (the closure's Jacobian, the Lagrangian's gradient) then has
+    no entries for these steps.
+    """
+    for s in range(axes.shape[0]):
+        if is_bound(stiffness, s):
+            axes[s] = 0.0
+
+
+@njit(cache=True, nogil=True)
+def hold_ground(steps: Any, angles: Any) -> None:
+    """Put the steps that a guest holds to their ground values, in place."""
+    for s in range(angles.shape[0]):
+        if is_bound(steps.stiffness, s):
+            angles[s] = steps.ground[s]
+
+
+@njit(cache=True, nogil=True)
 def _evaluate_hinges(state: HingeState, steps: HingeSteps) -> float:
     linearise_placed(
         state.angles, state.form, state.centres, state.frames, state.axes, state.halves
     )
+    still_axes(steps.stiffness, state.axes)
     n = state.angles.shape[0]
     work = end_residual(
         state.boundary, state.centres[n], state.frames[n], state.turn, state.closure
@@ -197,6 +218,8 @@ def _evaluate_hinges(state: HingeState, steps: HingeSteps) -> float:
 @njit(cache=True, nogil=True)
 def _evaluate_rigid(state: RigidState, steps: RigidSteps) -> float:
     linearise_rigid(state.angles, state.kinematics)
+    still_axes(steps.stiffness, state.kinematics.axes)
+    still_axes(steps.stiffness, state.kinematics.velocities)
     n = state.angles.shape[0]
     work = end_residual(
         state.boundary,
@@ -380,7 +403,8 @@ def _turn_hinges(state: HingeState, step: Any, fraction: float, out: Any) -> Non
                 out[s, j] += 2.0 * math.pi * round((plain - out[s, j]) / (2.0 * math.pi))
             if not abs(out[s, j] - plain) < 0.5:
                 close = False
-        if not close:
+        # What a guest holds does not move, not even by round-off.
+        if not close or (step[s, 0] == 0.0 and step[s, 1] == 0.0 and step[s, 2] == 0.0):
             for j in range(3):
                 out[s, j] = angles[s, j] + fraction * step[s, j]
 
@@ -398,6 +422,7 @@ def _turn_rigid(state: RigidState, step: Any, fraction: float, out: Any) -> None
         close = abs(out[s, 0] - plain) < 0.5
         for j in range(1, 3):
             close = close and abs(out[s, j] - angles[s, j] - fraction * step[s, j]) < 0.5
+        close = close and not (step[s, 0] == 0.0 and step[s, 1] == 0.0 and step[s, 2] == 0.0)
         # Translations are seen from the mid-step frame: they do not change when it turns.
         for j in range(0 if not close else 3, 6):
             out[s, j] = angles[s, j] + fraction * step[s, j]
