@@ -165,7 +165,7 @@ def laplace_and_registers():
 
 
 def scan():
-    from dnacheck.scan.scan import scan_row
+    from dnacheck.scanning.scan import scan_row
 
     arguments = {"angles": "trifonov", "persistence_length_A": 300.0}
     rows = [scan_row("a", LETTERS, arguments), scan_row("b", "A" * 42, arguments)]

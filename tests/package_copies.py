@@ -12,7 +12,7 @@ from pathlib import Path
 
 import dnacheck
 from dnacheck.model.data_files import data_directory
-from dnacheck.validate.scene.scene import scenes_directory
+from dnacheck.validation.scene.scene import scenes_directory
 
 
 def copy_package(folder):

@@ -62,7 +62,7 @@ def test_a_wheel_holds_data_scenes_and_templates(tmp_path):
         for path in (ROOT / folder).rglob("*"):
             if path.is_file() and path.name != ".gitkeep":
                 assert f"dnacheck/{inside}/{path.relative_to(ROOT / folder).as_posix()}" in names
-    templates = "dnacheck/validate/report/templates"
+    templates = "dnacheck/validation/report/templates"
     assert {f"{templates}/report.html.j2", f"{templates}/report.js"} <= names
     assert not [name for name in names if "oracles" in name and "validation" in name]
     assert not [name for name in names if name.startswith("tests")]

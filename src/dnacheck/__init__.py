@@ -2,7 +2,7 @@
 
 Importing the package is cheap on purpose; numerical libraries are loaded by the subpackages that
 need them: :mod:`dnacheck.numerics`, :mod:`dnacheck.model`, :mod:`dnacheck.equilibria`,
-:mod:`dnacheck.cyclization`, :mod:`dnacheck.md` and :mod:`dnacheck.validate`.
+:mod:`dnacheck.cyclization`, :mod:`dnacheck.md` and :mod:`dnacheck.validation`.
 """
 
 __all__ = ["__version__"]

@@ -19,7 +19,7 @@ from dnacheck.io.sequences import SequenceSource
 from dnacheck.model.chain import build_chain
 from dnacheck.model.parameters import load_parameters
 from dnacheck.numerics.outcome import InputError
-from dnacheck.scan.scan import (
+from dnacheck.scanning.scan import (
     COLUMNS,
     STATUS_FOUND,
     STATUS_FREE,

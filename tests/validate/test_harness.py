@@ -13,25 +13,25 @@ import pytest
 from dnacheck.cli import main
 from dnacheck.model.data_files import data_directory
 from dnacheck.numerics.outcome import InputError
-from dnacheck.validate.engine import run as harness
-from dnacheck.validate.engine import worker
-from dnacheck.validate.engine.baseline import compare, read_baseline
-from dnacheck.validate.engine.context import Context, seed_of
-from dnacheck.validate.engine.plan import Plan, Step, make_plan
-from dnacheck.validate.engine.registry import Check, Findings, Level, all_checks, find_check, select
-from dnacheck.validate.engine.runner import run_checks
-from dnacheck.validate.engine.state import (
+from dnacheck.validation.engine import run as harness
+from dnacheck.validation.engine import worker
+from dnacheck.validation.engine.baseline import compare, read_baseline
+from dnacheck.validation.engine.context import Context, seed_of
+from dnacheck.validation.engine.plan import Plan, Step, make_plan
+from dnacheck.validation.engine.registry import Check, Findings, Level, all_checks, find_check, select
+from dnacheck.validation.engine.runner import run_checks
+from dnacheck.validation.engine.state import (
     StateFolder,
     findings_from_json,
     findings_to_json,
     run_key,
 )
-from dnacheck.validate.engine.verdict import Rule, Verdict, judge, must_fail
-from dnacheck.validate.report.html import report_html
-from dnacheck.validate.report.record import Column, Figure, Note, Rings, Table
-from dnacheck.validate.report.tables import table_csv
-from dnacheck.validate.report.write import RunRecord, report_json
-from dnacheck.validate.scene.file import load_scene
+from dnacheck.validation.engine.verdict import Rule, Verdict, judge, must_fail
+from dnacheck.validation.report.html import report_html
+from dnacheck.validation.report.record import Column, Figure, Note, Rings, Table
+from dnacheck.validation.report.tables import table_csv
+from dnacheck.validation.report.write import RunRecord, report_json
+from dnacheck.validation.scene.file import load_scene
 
 NASTY = "<script>alert('x')</script>"
 
@@ -52,7 +52,7 @@ def findings(results=None):
 
 def record_of(scene, found, provenance_seconds=1.0):
     check = Check("table2.discrete", "a check", lambda context: found, 1.0)
-    from dnacheck.validate.engine.provenance import provenance
+    from dnacheck.validation.engine.provenance import provenance
 
     return RunRecord(
         scene=scene,
@@ -178,8 +178,8 @@ def test_the_drawing_library_travels_compressed(scene):
 
 
 def test_the_check_nearest_to_its_limit_is_shown(scene):
-    from dnacheck.validate.report.record import Section
-    from dnacheck.validate.report.summary import glance, share_used
+    from dnacheck.validation.report.record import Section
+    from dnacheck.validation.report.summary import glance, share_used
 
     def judged(name, got, rule, tolerance=None, **more):
         return judge(f"table2.{name}", "q", got, 2.0, rule, "s", "w", tolerance, **more)
@@ -240,7 +240,7 @@ def test_only_selects_by_name_group_and_pattern():
 
 def test_missing_modules_are_skipped_with_the_reason(scene, monkeypatch):
     check = replace(find_check("table2.discrete"), requires=("dnacheck.nowhere.at_all",))
-    monkeypatch.setattr("dnacheck.validate.engine.plan.all_checks", lambda: (check,))
+    monkeypatch.setattr("dnacheck.validation.engine.plan.all_checks", lambda: (check,))
     plan = make_plan(scene, Level.QUICK)
     assert [step.check.name for step in plan.skipped] == ["table2.discrete"]
     assert "not installed" in plan.skipped[0].reason

@@ -6,16 +6,16 @@ import sys
 
 import pytest
 
-from dnacheck.validate.checks.requested.ln_j import ln_J
-from dnacheck.validate.checks.requested.shapes import shape
-from dnacheck.validate.checks.requested.thermal import equipartition, sampled, thermal_energy
-from dnacheck.validate.engine.context import Context
-from dnacheck.validate.engine.pilots import Candidate, choose
-from dnacheck.validate.engine.plan import make_plan
-from dnacheck.validate.engine.registry import Level
-from dnacheck.validate.engine.verdict import Verdict
-from dnacheck.validate.scene.file import read_scene
-from dnacheck.validate.scene.scene import Wanted
+from dnacheck.validation.checks.requested.ln_j import ln_J
+from dnacheck.validation.checks.requested.shapes import shape
+from dnacheck.validation.checks.requested.thermal import equipartition, sampled, thermal_energy
+from dnacheck.validation.engine.context import Context
+from dnacheck.validation.engine.pilots import Candidate, choose
+from dnacheck.validation.engine.plan import make_plan
+from dnacheck.validation.engine.registry import Level
+from dnacheck.validation.engine.verdict import Verdict
+from dnacheck.validation.scene.file import read_scene
+from dnacheck.validation.scene.scene import Wanted
 
 SCENE = """title = "t"
 
@@ -54,10 +54,10 @@ def test_energies_alone_load_neither_sampling_nor_dynamics(tmp_path):
     scene_of(tmp_path, "energy = 0.005")
     program = f"""
 import json, sys
-from dnacheck.validate.engine.context import Context
-from dnacheck.validate.engine.plan import make_plan
-from dnacheck.validate.engine.registry import Level
-from dnacheck.validate.scene.file import load_scene
+from dnacheck.validation.engine.context import Context
+from dnacheck.validation.engine.plan import make_plan
+from dnacheck.validation.engine.registry import Level
+from dnacheck.validation.scene.file import load_scene
 scene = load_scene({str(tmp_path / "scene.toml")!r})
 checks = make_plan(scene, Level.DEFAULT).chosen
 for check in checks:
@@ -121,7 +121,7 @@ def test_mean_energy_of_a_stiff_chain_is_equipartition(tmp_path):
     """Ten times the stiffness leaves a tenth of what is not harmonic."""
     from dataclasses import replace
 
-    from dnacheck.validate.engine.rings import scene_chain
+    from dnacheck.validation.engine.rings import scene_chain
 
     scene = scene_of(tmp_path, "thermal_energy = 0.01")
     chain = scene_chain(scene, scene.molecule_list[0])

@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 from dnacheck.cli import main
 from dnacheck.model.data_files import data_directory
 from dnacheck.numerics.outcome import InputError
-from dnacheck.validate.engine.plan import make_plan
-from dnacheck.validate.engine.registry import Level
-from dnacheck.validate.engine.rings import scene_chain
-from dnacheck.validate.engine.state import run_key
-from dnacheck.validate.scene.file import load_scene, read_scene
-from dnacheck.validate.scene.line_numbers import line_numbers
-from dnacheck.validate.scene.scene import FILLED_IN, shipped_scenes
+from dnacheck.validation.engine.plan import make_plan
+from dnacheck.validation.engine.registry import Level
+from dnacheck.validation.engine.rings import scene_chain
+from dnacheck.validation.engine.state import run_key
+from dnacheck.validation.scene.file import load_scene, read_scene
+from dnacheck.validation.scene.line_numbers import line_numbers
+from dnacheck.validation.scene.scene import FILLED_IN, shipped_scenes
 
 GOOD = """title = "t"
 
@@ -202,7 +202,7 @@ def test_a_new_scene_is_the_template_and_never_overwrites(tmp_path, capsys):
 
 
 def test_the_template_names_every_key():
-    from dnacheck.validate.scene.scene import Scene, scenes_directory
+    from dnacheck.validation.scene.scene import Scene, scenes_directory
 
     text = (scenes_directory() / "template.toml").read_text()
     for name, field in Scene.model_fields.items():

@@ -5,10 +5,10 @@ import pytest
 from dnacheck.model.chain import build_chain
 from dnacheck.model.molecules import embedded
 from dnacheck.model.rod import build_rod
-from dnacheck.validate.checks import speed
-from dnacheck.validate.engine.plan import make_plan
-from dnacheck.validate.engine.registry import Level
-from dnacheck.validate.scene.file import load_scene
+from dnacheck.validation.checks import speed
+from dnacheck.validation.engine.plan import make_plan
+from dnacheck.validation.engine.registry import Level
+from dnacheck.validation.scene.file import load_scene
 
 
 @pytest.fixture(scope="module")

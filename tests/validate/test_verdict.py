@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from dnacheck.validate.engine.verdict import (
+from dnacheck.validation.engine.verdict import (
     Rule,
     Verdict,
     failed,

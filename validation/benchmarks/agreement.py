@@ -23,14 +23,14 @@ from dnacheck.cyclization.methods import Umbrella
 from dnacheck.equilibria.discrete.search import find_rings
 from dnacheck.model.chain import Chain, build_chain, uniform_stiffness
 from dnacheck.model.molecules import embedded, embedded_names
-from dnacheck.validate.reference.agreement import (
+from dnacheck.validation.reference.agreement import (
     APPROXIMATE,
     CompareOptions,
     compare_methods,
     differences,
     standard_error,
 )
-from dnacheck.validate.reference.wormlike_chain import chain_rod_j
+from dnacheck.validation.reference.wormlike_chain import chain_rod_j
 
 SEED = 1
 BEST = ("09T15", "08T15", "08A17")

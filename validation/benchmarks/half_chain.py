@@ -21,7 +21,7 @@ from dnacheck.equilibria.discrete.search import find_rings
 from dnacheck.equilibria.ring import Equilibria
 from dnacheck.model.chain import Chain, build_chain, uniform_stiffness
 from dnacheck.model.molecules import embedded, embedded_names
-from dnacheck.validate.reference.wormlike_chain import chain_rod_j
+from dnacheck.validation.reference.wormlike_chain import chain_rod_j
 
 SEED = 1
 BEST = ("09T15", "08T15", "08A17")

@@ -25,7 +25,7 @@ from dnacheck.model.chain import Chain, build_chain, uniform_stiffness
 from dnacheck.model.molecules import embedded, embedded_names
 from dnacheck.model.sequence import parse_sequence
 from dnacheck.numerics.outcome import SolveError
-from dnacheck.validate.reference.work_precision import LONG, molecules, study, warm_up
+from dnacheck.validation.reference.work_precision import LONG, molecules, study, warm_up
 
 SEED = 1
 RANDOM_MOLECULES = 200

@@ -24,8 +24,8 @@ from dnacheck.mechanics.sensitivity import sensitivity_of
 from dnacheck.model.chain import build_chain
 from dnacheck.model.molecules import Molecule, embedded, embedded_names
 from dnacheck.model.sequence import parse_sequence
-from dnacheck.validate.reference.table3 import published_table
-from dnacheck.validate.reference.wormlike_chain import chain_rod_j
+from dnacheck.validation.reference.table3 import published_table
+from dnacheck.validation.reference.wormlike_chain import chain_rod_j
 
 WIDTHS = {
     "persistence_length_A": 10.0,

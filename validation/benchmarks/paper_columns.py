@@ -20,7 +20,7 @@ from dnacheck.mechanics.parameters import chain_derivatives, modified_chain, own
 from dnacheck.model.chain import build_chain
 from dnacheck.model.molecules import embedded
 from dnacheck.model.sequence import STEP_NAMES, reverse_complement
-from dnacheck.validate.reference.table3 import published_table
+from dnacheck.validation.reference.table3 import published_table
 
 ROUNDING = 0.1 / np.sqrt(12.0)
 """Standard deviation of a value printed to one decimal, RT; two such per difference."""

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dnacheck.scan.scan import ScanOptions, scan
+from dnacheck.scanning.scan import ScanOptions, scan
 
 LENGTH = 150
 

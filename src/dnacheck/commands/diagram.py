@@ -190,7 +190,7 @@ def _draw(
 ) -> None:
     from dnacheck.commands.pictures import save_figure
     from dnacheck.equilibria.continuation.figures import marked_rings, ring_shape
-    from dnacheck.validate.plots import continuation as plots
+    from dnacheck.validation.plots import continuation as plots
 
     branches = [branch for record in data for branch in record["branches"]]
     rings = [] if target == "perfect" else [ring_shape(r) for r in marked_rings(found[0])[:2]]

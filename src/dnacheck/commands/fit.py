@@ -117,7 +117,7 @@ def command(
         note(warning, run.quiet)
     if plot is not None:
         from dnacheck.commands.pictures import save_figure
-        from dnacheck.validate.plots import mechanics as plots
+        from dnacheck.validation.plots import mechanics as plots
 
         def draw(figure: Any) -> None:
             plots.fitted(figure.subplots(), record)

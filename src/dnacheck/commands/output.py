@@ -7,10 +7,13 @@ import json
 import math
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any
+
+from dnacheck.io.progress import progress_bar as progress
+
+__all__ = ["json_text", "note", "plain", "print_json", "progress"]
 
 
 def plain(value: Any) -> Any:
@@ -65,36 +68,3 @@ def note(text: str, quiet: bool = False) -> None:
     """One line for the reader on standard error, unless quiet."""
     if not quiet:
         print(f"dnacheck: {' '.join(text.split())}", file=sys.stderr)
-
-
-@contextmanager
-def progress(
-    description: str, total: int | None, quiet: bool = False
-) -> Iterator[Callable[[int], None]]:
-    """Progress bar on standard error, if that is a terminal.
-
-    Parameters
-    ----------
-    description : str
-        What is being done.
-    total : int or None
-        Number of pieces of work, None if unknown.
-
-    Yields
-    ------
-    callable
-        ``advance(n)``: so many more pieces are done. It may be called from any thread.
-    """
-    if quiet or not sys.stderr.isatty():
-        yield lambda pieces: None
-        return
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(description, total=total)
-
-        def advance(pieces: int) -> None:
-            bar.advance(task, pieces)
-
-        yield advance

@@ -153,7 +153,7 @@ def command(
             _print(record)
     if plot is not None:
         from dnacheck.commands.pictures import save_figure
-        from dnacheck.validate.plots import mechanics as plots
+        from dnacheck.validation.plots import mechanics as plots
 
         def draw(figure: Any) -> None:
             plots.profile(figure.subplots(), records, points)

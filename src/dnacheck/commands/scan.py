@@ -39,7 +39,7 @@ def command(
     exit code is 3.
     """
     from dnacheck.io.sequences import SequenceSource
-    from dnacheck.scan.scan import ScanOptions, scan, state_path, summary_line
+    from dnacheck.scanning.scan import ScanOptions, scan, state_path, summary_line
 
     source = SequenceSource(fasta)
     options = ScanOptions(model.chain_arguments(), run.threads)

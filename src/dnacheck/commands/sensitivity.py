@@ -111,7 +111,7 @@ def command(
         note(f"table written to {table}", run.quiet or run.json)
     if plot is not None:
         from dnacheck.commands.pictures import save_figure
-        from dnacheck.validate.plots import mechanics as plots
+        from dnacheck.validation.plots import mechanics as plots
 
         def draw(figure: Any) -> None:
             upper, lower = figure.subplots(2, 1, sharex=True)

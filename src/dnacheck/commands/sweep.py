@@ -171,7 +171,7 @@ def _print(record: dict[str, Any]) -> None:
 
 def _draw(path: Path, records: list[dict[str, Any]]) -> None:
     from dnacheck.commands.pictures import save_figure
-    from dnacheck.validate.plots import continuation as plots
+    from dnacheck.validation.plots import continuation as plots
 
     def draw(figure: Any) -> None:
         axes = figure.subplots(1, 3)

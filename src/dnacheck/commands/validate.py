@@ -11,9 +11,9 @@ from dnacheck.commands.common import RunSettings, common_options
 from dnacheck.commands.output import note, print_json, progress
 
 if TYPE_CHECKING:
-    from dnacheck.validate.engine.plan import Plan
-    from dnacheck.validate.engine.registry import Check, Findings
-    from dnacheck.validate.report.write import RunRecord
+    from dnacheck.validation.engine.plan import Plan
+    from dnacheck.validation.engine.registry import Check, Findings
+    from dnacheck.validation.report.write import RunRecord
 
 EXIT_CHECK_FAILED = 1
 
@@ -62,10 +62,10 @@ def command(
     if new_scene is not None:
         _write_scene(new_scene, run)
         return None
-    from dnacheck.validate.engine.plan import make_plan
-    from dnacheck.validate.engine.registry import Level, select
-    from dnacheck.validate.engine.run import RunOptions, run_scene
-    from dnacheck.validate.scene.file import load_scene
+    from dnacheck.validation.engine.plan import make_plan
+    from dnacheck.validation.engine.registry import Level, select
+    from dnacheck.validation.engine.run import RunOptions, run_scene
+    from dnacheck.validation.scene.file import load_scene
 
     level = Level.QUICK if quick else Level.FULL if full else Level.DEFAULT
     chosen = select(only) if only else None
@@ -88,7 +88,7 @@ def _write_scene(path: Path, run: RunSettings) -> None:
     """Write the commented template; an existing file is not overwritten."""
     from dnacheck.io.files import atomic_write
     from dnacheck.numerics.outcome import InputError
-    from dnacheck.validate.scene.scene import scenes_directory
+    from dnacheck.validation.scene.scene import scenes_directory
 
     if path.exists():
         raise InputError(f"file '{path}' exists; name another file for the new scene")
@@ -122,7 +122,7 @@ def _print_list(plan: Plan, as_json: bool) -> None:
 
 
 def _print_outcome(record: RunRecord, output: Path, run: RunSettings) -> None:
-    from dnacheck.validate.report.html import count, duration
+    from dnacheck.validation.report.html import count, duration
 
     counts = count(record.results)
     if run.json:

@@ -11,7 +11,7 @@ from dnacheck.model.chain import Chain, build_chain
 from dnacheck.model.cut import least_rotation
 from dnacheck.model.parameters import load_parameters
 from dnacheck.model.sequence import Sequence
-from dnacheck.scan.scan import scan_row
+from dnacheck.scanning.scan import scan_row
 
 SETS = ("trifonov2", "trifonov", "desantis")
 

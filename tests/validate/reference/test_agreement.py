@@ -9,7 +9,7 @@ from rods import molecule_chain
 from dnacheck.cyclization.methods import Umbrella
 from dnacheck.cyclization.result import JFactor
 from dnacheck.equilibria.discrete.search import find_rings
-from dnacheck.validate.reference.agreement import (
+from dnacheck.validation.reference.agreement import (
     CompareOptions,
     Difference,
     compare_methods,

@@ -13,7 +13,7 @@ from dnacheck.cyclization.result import JFactor
 from dnacheck.model.chain import Chain, build_chain
 from dnacheck.model.molecules import embedded
 from dnacheck.numerics.outcome import InputError
-from dnacheck.validate.reference.table3 import (
+from dnacheck.validation.reference.table3 import (
     ANGLE_SETS,
     RATIOS,
     compare_column,

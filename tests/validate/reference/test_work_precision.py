@@ -2,7 +2,7 @@
 
 from rods import molecule_chain
 
-from dnacheck.validate.reference.work_precision import SpeedOptions, molecules, study
+from dnacheck.validation.reference.work_precision import SpeedOptions, molecules, study
 
 TINY = SpeedOptions(
     batches=(20, 80), pairs=(20, 320), halves=(4_000,), plain_halves=(1_000,), records=(20,)

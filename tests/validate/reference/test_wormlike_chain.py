@@ -10,7 +10,7 @@ from dnacheck.cyclization.half_chain.sampling import HalfChainOptions, half_chai
 from dnacheck.cyclization.result import PER_CUBIC_ANGSTROM_IN_MOLAR
 from dnacheck.model.chain import Chain, uniform_stiffness
 from dnacheck.numerics.outcome import InputError
-from dnacheck.validate.reference.wormlike_chain import (
+from dnacheck.validation.reference.wormlike_chain import (
     aligned_ends_j,
     chain_rod_j,
     free_ends_j,

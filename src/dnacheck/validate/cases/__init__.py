@@ -1,5 +1,0 @@
-"""Cases in which naive code breaks, each with what must happen and what did."""
-
-from dnacheck.validate.cases.case import HardCase
-
-__all__ = ["HardCase"]
