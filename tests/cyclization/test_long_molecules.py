@@ -12,7 +12,7 @@ from dnacheck.equilibria.discrete.search import find_rings
 from dnacheck.io.sequences import parse_sequence
 from dnacheck.model.chain import Chain, build_chain, uniform_stiffness
 from dnacheck.numerics.statistics import summarise_weights
-from dnacheck.validate.reference.wormlike_chain import long_ring_j
+from dnacheck.validation.reference.wormlike_chain import long_ring_j
 
 SIGMAS = 3.0
 # -ln J of prefixes of one random molecule, by half chains drawn about rings in windows of another

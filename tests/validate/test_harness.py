@@ -18,7 +18,14 @@ from dnacheck.validation.engine import worker
 from dnacheck.validation.engine.baseline import compare, read_baseline
 from dnacheck.validation.engine.context import Context, seed_of
 from dnacheck.validation.engine.plan import Plan, Step, make_plan
-from dnacheck.validation.engine.registry import Check, Findings, Level, all_checks, find_check, select
+from dnacheck.validation.engine.registry import (
+    Check,
+    Findings,
+    Level,
+    all_checks,
+    find_check,
+    select,
+)
 from dnacheck.validation.engine.runner import run_checks
 from dnacheck.validation.engine.state import (
     StateFolder,

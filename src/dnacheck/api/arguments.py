@@ -20,9 +20,10 @@ def positive(name: str, value: Any) -> float:
     """A finite number greater than 0."""
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         raise InputError(f"{name} must be a number greater than 0, not {value!r}")
-    if not (math.isfinite(value) and value > 0.0):
-        raise InputError(f"{name} must be a finite number greater than 0, not {value}")
-    return float(value)
+    number = float(value)
+    if not (math.isfinite(number) and number > 0.0):
+        raise InputError(f"{name} must be a finite number greater than 0, not {number}")
+    return number
 
 
 def positive_or_none(name: str, value: Any) -> float | None:
@@ -42,7 +43,9 @@ def one_of(name: str, value: Any, known: Iterable[str]) -> str:
     names = tuple(known)
     if isinstance(value, str) and value in names:
         return value
-    raise InputError(f"{name} must be one of {', '.join(names)}, not {value!r}{nearest(value, names)}")
+    raise InputError(
+        f"{name} must be one of {', '.join(names)}, not {value!r}{nearest(value, names)}"
+    )
 
 
 def nearest(value: Any, known: Iterable[str]) -> str:
@@ -62,7 +65,9 @@ def thread_count(threads: int | None) -> int:
 
 
 @contextmanager
-def told(progress: Progress, description: str, total: int | None) -> Iterator[Callable[[int], None]]:
+def told(
+    progress: Progress, description: str, total: int | None
+) -> Iterator[Callable[[int], None]]:
     """``advance(n)`` of an argument ``progress``: so many more pieces are done."""
     if callable(progress):
         yield progress

@@ -80,7 +80,7 @@ def rings(
     >>> import dnacheck as dc
     >>> ring = dc.rings("11T15").lowest
     >>> round(ring.energy_RT, 2), ring.link, ring.stable
-    (27.47, 15, True)
+    (10.53, 15, True)
     >>> ring.coordinates_A.shape, ring.angles_deg.shape
     ((159, 3), (158, 3))
     """

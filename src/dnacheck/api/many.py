@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from dnacheck.api.arguments import Progress, one_of, thread_count, told, whole
+from dnacheck.api.molecules import chain
 from dnacheck.numerics.outcome import InputError
 
 if TYPE_CHECKING:
@@ -91,7 +92,8 @@ def scan(
     Examples
     --------
     >>> import dnacheck as dc, pathlib
-    >>> _ = pathlib.Path("two.fasta").write_text(">a\\n" + "ACGTTGCATC" * 15 + "\\n>b\\nACG\\n")
+    >>> letters = dc.chain("11T15").letters
+    >>> _ = pathlib.Path("two.fasta").write_text(f">a\\n{letters}\\n>b\\nACG\\n")
     >>> table = dc.scan("two.fasta").to_frame()
     >>> list(table["name"]), list(table["status"])[0]
     (['a', 'b'], 'ok')
@@ -105,6 +107,8 @@ def scan(
     if not isinstance(source, (str, os.PathLike)):
         raise InputError(f"source must be a path or '-', not {source!r}")
     records = SequenceSource(source)
+    # What no molecule could be built with is refused before any is read.
+    chain("ACGTTGCATCA", **{key: value for key, value in parameters.items() if key != "a_tracts"})
     arguments = dict(parameters)
     arguments["angles"] = arguments.pop("parameters", "trifonov2")
     options = ScanOptions(arguments, thread_count(threads))

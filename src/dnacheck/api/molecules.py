@@ -42,8 +42,6 @@ def molecule(target: Target) -> Molecule:
             f"{type(target).__name__}"
         )
     text = os.fspath(target)
-    if isinstance(text, bytes):
-        text = os.fsdecode(text)
     if not text.strip():
         raise InputError("target is empty; give a name such as 11T15, letters or a FASTA file")
     if isinstance(target, os.PathLike) and not Path(text).exists():
@@ -114,7 +112,7 @@ def chain(
     >>> import dnacheck as dc
     >>> chain = dc.chain("11T15", twist_ratio=1.4)
     >>> chain.n_steps, chain.angle_set, chain.letters[:8]
-    (158, 'trifonov2', 'TCGAGCCC')
+    (158, 'trifonov2', 'GATGAATT')
     """
     if isinstance(parameters, os.PathLike):
         parameters = os.fspath(parameters)
@@ -179,7 +177,7 @@ def rod(
     >>> import dnacheck as dc
     >>> rod = dc.rod(dc.chain("11T15"))
     >>> rod.n_steps, round(rod.relaxed_turns, 1)
-    (158, 14.9)
+    (158, 15.2)
     """
     options = RodOptions(
         filter_width=whole("filter_width", filter_width, 1),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,9 @@ from numpy.typing import NDArray
 from dnacheck.equilibria.continuation.branch import Branch, Kind, SpecialPoint
 from dnacheck.equilibria.continuation.follow import Bounds, follow_branch
 from dnacheck.equilibria.continuation.walker import Spot, Walker
+
+if TYPE_CHECKING:
+    import pandas
 
 Array = NDArray[np.float64]
 
@@ -63,6 +67,24 @@ class Component:
                 f"{len(self.unexplored)} branch points were not followed: raise max_branches"
             )
         return "; ".join(dict.fromkeys(words)) or "complete within the bounds"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The branches as lists of numbers, in RT and turns: a component in the commands' JSON."""
+        from dnacheck.equilibria.continuation.figures import component_data
+
+        return component_data(self, link=True)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A row for each point of each branch: energies and end moment in RT, alpha in turns."""
+        import pandas
+
+        names = ["alpha", "value", "energy", "bend", "twist", "end_moment", "link"]
+        names += ["negative_directions", "residual"]
+        parts = []
+        for number, branch in enumerate(self.to_dict()["branches"]):
+            columns = {name: branch[name] for name in names if name in branch}
+            parts.append(pandas.DataFrame({"branch": number, **columns}))
+        return pandas.concat(parts, ignore_index=True)
 
     def of_kind(self, kind: Kind) -> tuple[SpecialPoint, ...]:
         """Special points of one kind, lowest energy first, each once."""

@@ -12,7 +12,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,6 +25,9 @@ from dnacheck.equilibria.continuation.twist_ratio_models import (
 from dnacheck.model.chain import Chain
 from dnacheck.model.rod.rod import Rod
 from dnacheck.numerics.outcome import InputError
+
+if TYPE_CHECKING:
+    import pandas
 
 Array = NDArray[np.float64]
 
@@ -136,6 +139,23 @@ class RatioSweep:
     def energy_RT(self) -> Array:
         """Lowest energy in RT."""
         return self.energy * self.energy_scale_RT
+
+    def to_dict(self) -> dict[str, Any]:
+        """Arrays in RT, tracks and crossings: a sweep in the commands' JSON."""
+        from dnacheck.equilibria.continuation.figures import sweep_data
+
+        return sweep_data(self)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A row for each ratio: energies of the lowest ring in RT, its link and residual."""
+        import pandas
+
+        data = self.to_dict()
+        names = ("ratios", "energy", "bend", "twist", "link", "residual")
+        columns = ("ratio", "energy_RT", "bend_RT", "twist_RT", "link", "residual")
+        return pandas.DataFrame(
+            {column: data[name] for name, column in zip(names, columns, strict=True)}
+        )
 
     @property
     def missing(self) -> Array:
