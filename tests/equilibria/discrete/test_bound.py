@@ -7,10 +7,11 @@ import pytest
 
 from dnacheck.equilibria.boundary import Loop, NickedRing
 from dnacheck.equilibria.discrete.boundary_search import find_equilibria
+from dnacheck.equilibria.discrete.kernels.search import fill_start
 from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
 from dnacheck.equilibria.discrete.solve import NewtonOptions, solve_ring
-from dnacheck.model.chain import Chain, build_chain, chain_frames
-from dnacheck.model.guests import bind
+from dnacheck.model.chain import Chain, build_chain, chain_frames, uniform_stiffness
+from dnacheck.model.guests import bind, superhelix
 from dnacheck.model.molecules import embedded
 from dnacheck.numerics.outcome import InputError
 
@@ -134,3 +135,53 @@ def test_the_rod_refuses_a_guest():
 
     with pytest.raises(InputError, match="leave out what is bound"):
         build_rod(bind(chain_of("wedge"), 125, "cap"))
+
+
+def straight_chain(n=300, repeat=10.5):
+    ground = np.zeros((n, 3))
+    ground[:, 0] = 2.0 * np.pi / repeat
+    return Chain("straight", ground, uniform_stiffness(n, 1.5))
+
+
+def test_a_nucleosome_takes_one_turn_of_link_from_a_ring():
+    free = straight_chain()
+    chain = bind(free, 70, "nucleosome")
+    found = find_rings(chain)
+    # Fuller: a left-handed superhelix of 1.65 turns whose axis climbs at the angle a has the writhe
+    # -1.65 (1 - sin a); its 146 steps of 10.2 base pairs a turn have more twist than free ones. The
+    # loop that closes the ring writhes too, by less than a tenth of a turn.
+    climb = np.arctan(25.9 / (2.0 * np.pi * 41.9))
+    shift = -1.65 * (1.0 - np.sin(climb)) + 146.0 / 10.2 - 146.0 / 10.5
+    best = free.relaxed_turns + shift
+    assert found.lowest.link == 28
+    assert {27, 28} <= {ring.link for ring in found}
+    # With a nick the rest of the ring has no excess twist, so twist + writhe is the best link.
+    nicked = find_equilibria(chain, NickedRing()).lowest
+    assert nicked.twist_turns + nicked.writhe == pytest.approx(best, abs=0.1)
+    # Negative control: a right-handed superhelix adds link instead.
+    values = superhelix(147, 1.65, 41.9, 25.9, 3.4, 10.2)
+    # Its mirror image: twist and tilt change sign. The twist is made positive by whole turns.
+    values[:, 0] = 2.0 * np.pi - values[:, 0]
+    values[:, 1] *= -1.0
+    right = find_equilibria(bind(free, 70, values), NickedRing()).lowest
+    assert right.writhe > 0.5
+
+
+def test_a_guest_across_open_ends_is_refused():
+    chain = bind(straight_chain(), 200, "nucleosome")
+    with pytest.raises(InputError, match="not joined") as caught:
+        find_equilibria(chain, NickedRing())
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_minima_are_those_of_many_starts():
+    chain = bind(chain_of("wedge"), 125, "cap")
+    known = find_rings(chain)
+    elastic = chain.elastic()
+    start = np.empty(chain.ground.shape)
+    for link in (14, 15, 16):
+        for register in np.arange(8) * np.pi / 4.0:
+            fill_start(elastic.arrays, link, register, start)
+            ring = solve_ring(chain, start, throw=False)
+            if ring.status.ok and ring.stable:
+                assert ring.energy > known.lowest.energy - 1e-9

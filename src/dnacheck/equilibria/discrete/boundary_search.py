@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from dnacheck.equilibria.boundary import AnyBoundary, HingedRing, Loop, NickedRing, Pull
-from dnacheck.equilibria.discrete.bound_search import hold_found
+from dnacheck.equilibria.discrete.bound_search import hold_found, refuse_torn_guests
 from dnacheck.equilibria.discrete.kernels.search import fill_start, predicted_registers
 from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
 from dnacheck.equilibria.discrete.solve import NewtonOptions, solve_ring
@@ -62,9 +62,9 @@ def find_equilibria(
             "the chain to a ring"
         )
     if chain.guests:
-        return hold_found(
-            chain, boundary, options.newton, lambda soft: find_equilibria(soft, boundary, options)
-        )
+        refuse_torn_guests(chain, boundary)
+        soft = find_equilibria(chain.elastic(), boundary, options)
+        return hold_found(chain, boundary, options.newton, soft)
     began = time.perf_counter()
     newton = NewtonOptions(
         options.newton.tolerance, options.newton.max_iterations, options.newton.turn_cap

@@ -24,7 +24,7 @@ from dnacheck.equilibria.discrete.kernels.search import (
     fill_start,
     search,
 )
-from dnacheck.equilibria.discrete.solve import RING, NewtonOptions, make_ring, solve_ring
+from dnacheck.equilibria.discrete.solve import NewtonOptions, make_ring, solve_ring
 from dnacheck.equilibria.ring import Equilibria, Equilibrium
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import InputError, Status
@@ -138,9 +138,9 @@ def find_rings(chain: Chain, options: SearchOptions | None = None) -> Equilibria
     """
     options = options or SearchOptions()
     if chain.guests:
-        from dnacheck.equilibria.discrete.bound_search import hold_found
+        from dnacheck.equilibria.discrete.bound_search import hold_rings
 
-        return hold_found(chain, RING, options.newton, lambda soft: find_rings(soft, options))
+        return hold_rings(chain, options, find_rings)
     found = _searched(chain, search_plan(chain, options.links), options.newton)
     if options.links == "auto" and len(_links_in_reach(chain)) > _MOST_LINKS:
         text = f"only the {_MOST_LINKS} links nearest to the ground twist were searched"
@@ -173,7 +173,18 @@ def search_minima(
     return _searched(chain, plan, options)
 
 
-def _searched(chain: Chain, plan: SearchPlan, options: NewtonOptions) -> Equilibria:
+def raw_minima(
+    chain: Chain, plan: SearchPlan, options: NewtonOptions
+) -> tuple[Minima, NDArray[np.intp], int, int]:
+    """What the compiled search finds, before it is made into rings.
+
+    Returns
+    -------
+    minima : Minima
+    order : ndarray, shape (found,)
+        Their places in ``minima``, lowest energy first.
+    starts, failed : int
+    """
     most = room(plan)
     minima = Minima(
         np.empty((most, *chain.ground.shape)),
@@ -181,12 +192,18 @@ def _searched(chain: Chain, plan: SearchPlan, options: NewtonOptions) -> Equilib
         np.empty((most, nk.N_FIGURES)),
         np.zeros(len(plan.links), dtype=bool),
     )
-    began = time.perf_counter()
     found, starts, failed = search(
         chain.arrays, plan, options.limits._replace(minima_only=True), minima
     )
-    seconds = time.perf_counter() - began
     order = np.argsort(minima.figures[:found, nk.ENERGY], kind="stable")
+    return minima, order, starts, failed
+
+
+def _searched(chain: Chain, plan: SearchPlan, options: NewtonOptions) -> Equilibria:
+    began = time.perf_counter()
+    minima, order, starts, failed = raw_minima(chain, plan, options)
+    seconds = time.perf_counter() - began
+    found, most = len(order), room(plan)
     rings = tuple(
         make_ring(
             chain,
