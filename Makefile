@@ -20,7 +20,8 @@ FIND_PYTHON = for p in $(PYTHON) python3.11 python3.12 python3.13 python3; do \
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-12s %s\n", $$1, $$2}'
 
-install: $(STAMP) ## environment with the locked versions and the package itself
+install: $(STAMP) ## environment with the locked versions, the package itself, kernels compiled
+	@$(BIN)/dnacheck compile
 
 $(PY):
 	@python=$$($(FIND_PYTHON)); \

@@ -40,6 +40,7 @@ COMMAND_HELP = {
     "md": "Check a ring with an OpenMM bead chain.",
     "scan": "Ring energy and J factor of many sequences, resumable.",
     "validate": "Run a validation scene and write its report.",
+    "compile": "Compile the kernels ahead of their first use.",
 }
 """One-line help of each command, kept here so that the group's help imports none of them."""
 

@@ -12,6 +12,7 @@ A command is written ::
 from __future__ import annotations
 
 import functools
+import importlib
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, fields
@@ -125,10 +126,28 @@ def _gathered(
 target_argument = click.argument("target", metavar="TARGET")
 
 
+def _announced(function: Function) -> Function:
+    """Tell the user of a command when it has to compile first."""
+
+    @functools.wraps(function)
+    def call(run: RunSettings, **values: Any) -> Any:
+        # Loads the compiler, which the start-up of the command line must not.
+        announced = importlib.import_module("dnacheck.commands.compiling").announced
+        name = click.get_current_context().info_name or ""
+        with announced(name, run.threads, run.quiet):
+            return function(run=run, **values)
+
+    wrapped: Any = call
+    return wrapped
+
+
 def common_options(function: Function) -> Function:
-    """Give a command ``--json --seed --threads --quiet --debug``; it receives ``run``."""
+    """Give a command ``--json --seed --threads --quiet --debug``; it receives ``run``.
+
+    Where kernels must be compiled, it is said on standard error.
+    """
     return _gathered(
-        function,
+        _announced(function),
         "run",
         RunSettings,
         [

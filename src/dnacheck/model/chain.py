@@ -436,7 +436,8 @@ def chain_frames(angles: ArrayLike, step_form: StepForm = "wedge") -> tuple[Arra
     frames : ndarray, shape (N+1, 3, 3)
         Directors d1, d2, d3 of base pair i in the columns of ``frames[i]`` (2.2).
     """
-    angles = np.ascontiguousarray(angles, dtype=float)
+    # Writable, as the kernels' other callers have it: read-only arrays are compiled for anew.
+    angles = np.require(angles, dtype=float, requirements=["C", "W"])
     centres = np.empty((len(angles) + 1, 3))
     frames = np.empty((len(angles) + 1, 3, 3))
     if step_form == "rigid":

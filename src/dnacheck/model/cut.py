@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from dnacheck.numerics.arrays import copy_rows, rolled_rows
+
 
 @njit(cache=True, nogil=True)
 def _order(steps: Any, i: int, j: int) -> int:
@@ -50,10 +52,11 @@ def least_rotation(steps: Any) -> int:
 
 
 @njit(cache=True, nogil=True)
-def rolled(rows: Any, cut: int) -> Any:
-    """Rows of an array, from row ``cut`` on."""
-    out = np.empty(rows.shape)
-    n = rows.shape[0]
+def rolled(ground: Any, stiffness: Any, cut: int) -> tuple[Any, Any]:
+    """Ground (N, c) and stiffness (N, c, c), from step ``cut`` on."""
+    out, matrices = np.empty(ground.shape), np.empty(stiffness.shape)
+    rolled_rows(ground, cut, out)
+    n = stiffness.shape[0]
     for s in range(n):
-        out[s] = rows[(s + cut) % n]
-    return out
+        copy_rows(stiffness[(s + cut) % n], matrices[s])
+    return out, matrices

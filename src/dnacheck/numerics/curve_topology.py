@@ -190,7 +190,8 @@ def edge_frames(centres: Any, frames: Any, out: Any) -> None:
         out[s, 0, 1] = t[1] * d1[2] - t[2] * d1[1]
         out[s, 1, 1] = t[2] * d1[0] - t[0] * d1[2]
         out[s, 2, 1] = t[0] * d1[1] - t[1] * d1[0]
-    out[n] = out[0]
+    for i in range(3):
+        out[n, i] = out[0, i]
 
 
 @njit(cache=True, nogil=True)

@@ -13,16 +13,19 @@ from dnacheck.equilibria.discrete.kernels.states import by_kind, evaluate, new_s
 from dnacheck.model.chain_kernels import HingeSteps, fill_frames
 from dnacheck.model.cut import rolled
 from dnacheck.model.rigid_kernels import RigidSteps, fill_rigid_frames
+from dnacheck.numerics.arrays import copy_rows, rolled_rows
 
 
 @njit(cache=True, nogil=True)
 def _rotated_hinges(steps: HingeSteps, cut: int) -> HingeSteps:
-    return HingeSteps(rolled(steps.ground, cut), rolled(steps.stiffness, cut), steps.form)
+    ground, stiffness = rolled(steps.ground, steps.stiffness, cut)
+    return HingeSteps(ground, stiffness, steps.form)
 
 
 @njit(cache=True, nogil=True)
 def _rotated_rigid(steps: RigidSteps, cut: int) -> RigidSteps:
-    return RigidSteps(rolled(steps.ground, cut), rolled(steps.stiffness, cut))
+    ground, stiffness = rolled(steps.ground, steps.stiffness, cut)
+    return RigidSteps(ground, stiffness)
 
 
 rotated = by_kind(_rotated_hinges, _rotated_rigid)
@@ -60,9 +63,7 @@ def roll_back(steps: Any, cut: int, angles: Any, multipliers: Any) -> tuple[floa
         frames = np.empty((n + 1, 3, 3))
         fill_shape(steps, angles, centres, frames)
         pair = n - cut
-        old = angles.copy()
-        for s in range(n):
-            angles[s] = old[(s + pair) % n]
+        rolled_rows(angles.copy(), pair, angles)
         f, m, r = multipliers[:3].copy(), multipliers[3:].copy(), centres[pair]
         m[0] -= r[1] * f[2] - r[2] * f[1]
         m[1] -= r[2] * f[0] - r[0] * f[2]
@@ -73,6 +74,6 @@ def roll_back(steps: Any, cut: int, angles: Any, multipliers: Any) -> tuple[floa
                 multipliers[j] += frames[pair, i, j] * f[i]
                 multipliers[3 + j] += frames[pair, i, j] * m[i]
     state = new_state(steps, ring_boundary())
-    state.angles[:] = angles
+    copy_rows(angles, state.angles)
     evaluate(state, steps)
     return residuals(state, multipliers, np.empty(angles.shape))

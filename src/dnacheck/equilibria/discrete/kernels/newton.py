@@ -27,6 +27,7 @@ from dnacheck.equilibria.discrete.kernels.states import (
     substitute,
 )
 from dnacheck.model.chain_kernels import is_bound
+from dnacheck.numerics.arrays import copy_rows
 
 CONVERGED = 0
 ITERATION_LIMIT = 1
@@ -156,7 +157,7 @@ def newton_away(
     shift, first = 0.0, 0.0
     escapes = 0
 
-    state.angles[:] = angles
+    copy_rows(angles, state.angles)
     hold_ground(steps, state.angles)
     for s in range(n):
         state.turn[0] += angles[s, 0]
@@ -250,5 +251,5 @@ def newton_away(
         for i in range(6):
             multipliers[i] += fraction * change[i]
         state, trial = trial, state
-    angles[:] = state.angles
+    copy_rows(state.angles, angles)
     return code

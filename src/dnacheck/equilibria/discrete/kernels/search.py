@@ -33,6 +33,7 @@ from dnacheck.equilibria.discrete.kernels.states import by_kind
 from dnacheck.model.chain_kernels import HingeSteps
 from dnacheck.model.cut import least_rotation
 from dnacheck.model.rigid_kernels import RigidSteps
+from dnacheck.numerics.arrays import copy_rows
 
 # Two minima are one when their energies agree to this relative precision and their angles to
 # the second figure, in radians; converged solutions agree far better.
@@ -163,9 +164,11 @@ def _keep(trial: Any, force: Any, figure: Any, found: int, minima: Minima) -> in
             return found
     if found == minima.angles.shape[0]:
         return found
-    minima.angles[found] = trial
-    minima.multipliers[found] = force
-    minima.figures[found] = figure
+    copy_rows(trial, minima.angles[found])
+    for i in range(force.shape[0]):
+        minima.multipliers[found, i] = force[i]
+    for i in range(figure.shape[0]):
+        minima.figures[found, i] = figure[i]
     return found + 1
 
 
