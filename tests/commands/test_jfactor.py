@@ -37,6 +37,27 @@ def test_auto_takes_laplace_where_its_measured_error_is_small_enough(capsys):
     assert abs(record["minus_lnJ"] - 15.765) < record["bias_bound"]
 
 
+def test_ends_that_are_freed(capsys):
+    """More closed shapes for a hinge; a nick averages over the turn of the end."""
+    values = {}
+    for ends in ("ring", "nicked", "hinged"):
+        code, out, _ = run(
+            capsys, "jfactor", "08T15", "--ends", ends, "--json", "--tolerance", "0.05"
+        )
+        record = json.loads(out)
+        assert code == 0
+        assert bool(record["links"]) == (ends == "ring")
+        values[ends] = record["minus_lnJ"]
+    assert values["hinged"] + 1.0 < values["ring"] < values["nicked"]
+
+
+def test_free_ends_have_no_link(capsys):
+    code, out, err = run(capsys, "jfactor", "08T15", "--ends", "nicked", "--link", "15")
+    assert code == 2
+    assert out == ""
+    assert "no link" in err
+
+
 def test_seed_fixes_the_result(capsys):
     results = [
         json.loads(run(capsys, "jfactor", "09T15", "--json", "--seed", seed)[1])["minus_lnJ"]
@@ -80,15 +101,15 @@ def test_time_runs_out_for_every_sampler(capsys, method):
 
 
 def test_a_molecule_without_a_stable_ring_is_said(capsys, monkeypatch):
-    from dnacheck.equilibria.discrete import search
+    from dnacheck.equilibria.discrete import boundary_search
 
     def nothing(chain, options=None):
         found = find_rings(chain, options)
         return replace(found, equilibria=(), links_searched=(3,))
 
-    find_rings = search.find_rings
-    monkeypatch.setattr(search, "find_rings", nothing)
-    monkeypatch.setattr("dnacheck.cyclization.laplace.register._seeds", lambda found: {})
+    find_rings = boundary_search.find_rings
+    monkeypatch.setattr(boundary_search, "find_rings", nothing)
+    monkeypatch.setattr("dnacheck.cyclization.laplace.register._seeds", lambda found: ({}, 0.0))
     for method in ("auto", "laplace", "closure", "half-chain", "metropolis"):
         code, out, err = run(capsys, "jfactor", "08T15", "--method", method)
         assert code == 3, method

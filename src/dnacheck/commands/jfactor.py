@@ -16,6 +16,7 @@ from dnacheck.commands.common import (
     RunSettings,
     bind_option,
     common_options,
+    ends_option,
     model_options,
     target_argument,
 )
@@ -58,6 +59,7 @@ EXIT_NOT_CONVERGED = 3
 @click.option(
     "--link", type=LinkChoice(), default="auto", show_default=True, help="Links to search."
 )
+@ends_option("ends")
 @model_options
 @bind_option
 @common_options
@@ -67,15 +69,19 @@ def command(
     tolerance: float,
     max_seconds: float | None,
     link: Any,
+    ends: str,
     model: ModelSettings,
     bind: tuple[str, ...],
     run: RunSettings,
 ) -> int | None:
     """J factor of TARGET: the molar density of exact closure, entropy included, nothing fitted.
 
-    -ln J is the free energy of cyclization over RT.
+    -ln J is the free energy of cyclization over RT. With nicked ends J is the density of closure in
+    place and axis, with hinged ends in place alone.
     """
-    from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
+    from dnacheck.equilibria.boundary import ENDS
+    from dnacheck.equilibria.discrete.boundary_search import find_equilibria
+    from dnacheck.equilibria.discrete.search import SearchOptions
     from dnacheck.io.sequences import read_target
     from dnacheck.model.chain import build_chain
     from dnacheck.model.ranges import check_link
@@ -99,7 +105,7 @@ def command(
 
         def compute(left: float, chain: Chain = chain) -> tuple[JFactor, Binding | None]:
             searching = time.perf_counter()
-            search = find_rings(chain, SearchOptions(links=link))
+            search = find_equilibria(chain, ENDS[ends], SearchOptions(links=link))
             if isinstance(link, int):
                 # Raises where the link has no ring: no other's J may stand for it.
                 _ = search.lowest

@@ -50,7 +50,7 @@ class Auto(Method):
     def run(self, target: Target, run: Run) -> JFactor:
         from dnacheck.numerics.seeds import seed_sequence
 
-        search = rings_of(target)
+        search = rings_of(target, any_end=True)
         results: list[JFactor] = []
         attempts: list[Attempt] = []
         for result in _results(target, search, run, seed_sequence(run.rng).spawn(4)):
@@ -84,6 +84,8 @@ def _results(
     from dnacheck.cyclization.half_chain.proposals import closing_is_easy
 
     began = time.perf_counter()
+    # Half chains meet as a closed ring and in no other way.
+    closed = search.boundary.label == "ring"
 
     def left(seed: SeedSequence, least: float = 0.0) -> Run | None:
         seconds = max(began + run.max_seconds - time.perf_counter(), least)
@@ -91,12 +93,12 @@ def _results(
 
     def halves() -> Iterator[JFactor]:
         allowed = left(seeds[2])
-        if allowed is not None and search.equilibria:
+        if allowed is not None and search.equilibria and closed:
             # Too few pairs that meet are no reason to give up what another method found.
             with contextlib.suppress(SolveError):
                 yield HalfChain().run(search, replace(allowed, progress=None))
 
-    if closing_is_easy(search):
+    if closed and closing_is_easy(search):
         yield from halves()
         return
     profile = register_profile_of(target if target is not search.chain else search)

@@ -129,15 +129,27 @@ class Method(ABC):
         """Compute J; see :meth:`compute`, which is what to call."""
 
 
-def rings_of(target: Target) -> Equilibria:
-    """The minima of a target, searched for where they are not given."""
+def rings_of(target: Target, any_end: bool = False) -> Equilibria:
+    """The minima of a target, searched for where they are not given.
+
+    Raises
+    ------
+    InputError
+        The end is not that of a ring, and the method that asks knows no other.
+    """
     from dnacheck.cyclization.laplace.register import RegisterProfile
     from dnacheck.equilibria.discrete.search import find_rings
     from dnacheck.equilibria.ring import Equilibria
 
     if isinstance(target, RegisterProfile):
-        return target.search
-    return target if isinstance(target, Equilibria) else find_rings(target)
+        target = target.search
+    search = target if isinstance(target, Equilibria) else find_rings(target)
+    if not any_end and search.boundary.label != "ring":
+        raise InputError(
+            f"this method knows closed rings alone; for a {search.boundary.label} chain use "
+            "closure or one of the Laplace methods"
+        )
+    return search
 
 
 def register_profile_of(target: Target) -> RegisterProfile:

@@ -459,6 +459,8 @@ class Equilibria(Sequence[Equilibrium]):
         not converge, as far as they were kept.
     notes : tuple of str
         Bounds that the search met, and what became of a link that has no ring.
+    boundary : Ring, NickedRing, HingedRing, Loop or Pull
+        What the end was held to.
     """
 
     source: Chain | Rod
@@ -470,6 +472,7 @@ class Equilibria(Sequence[Equilibrium]):
     status: Status
     ends: tuple[Equilibrium, ...] = ()
     notes: tuple[str, ...] = ()
+    boundary: AnyBoundary = RING
 
     @property
     def name(self) -> str:
@@ -509,13 +512,16 @@ class Equilibria(Sequence[Equilibrium]):
         for ring in self.equilibria:
             if ring.stable is not False:
                 return ring
-        raise SolveError(f"{self.model} ring of {self.name}: {self.reason}", self)
+        label = self.boundary.label
+        raise SolveError(f"{self.model} {label} of {self.name}: {self.reason}", self)
 
     @property
     def reason(self) -> str:
         """Why there is no minimum, in one line."""
         if self.notes:
             return "; ".join(self.notes)
+        if self.boundary != RING:
+            return f"{self.failed_starts} of {self.starts} starts did not converge to a minimum"
         links = ", ".join(map(str, self.links_searched))
         where = f" at link{'s' if len(self.links_searched) > 1 else ''} {links}" if links else ""
         if self.model == "discrete":

@@ -28,7 +28,7 @@ from dnacheck.cyclization.closure.kernels.draws import (
 )
 from dnacheck.cyclization.laplace.constrained_minimum import steps_in_RT
 from dnacheck.cyclization.laplace.register import RegisterProfile, register_profile
-from dnacheck.cyclization.result import JFactor, JStatus, link_shares
+from dnacheck.cyclization.result import JFactor, JStatus
 from dnacheck.equilibria.ring import Equilibria
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import InputError, SolveError
@@ -335,7 +335,7 @@ class ClosureSampler:
             method="closure",
             minus_lnJ=-(self.log_laplace + math.log(mean)),
             stderr=error,
-            links=link_shares(log_parts, errors),
+            links=profile.shares(log_parts, errors),
             bias_bound=bias,
             samples=int(single.size),
             effective_samples=float(single.sum() ** 2 / np.square(single).sum()),

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from dnacheck.cyclization.laplace.constrained_minimum import steps_in_RT
 from dnacheck.cyclization.laplace.kernels.anharmonic import scaled_log_weights
 from dnacheck.cyclization.laplace.register import RegisterProfile, register_profile
-from dnacheck.cyclization.result import JFactor, JStatus, link_shares
+from dnacheck.cyclization.result import JFactor, JStatus
 from dnacheck.equilibria.ring import Equilibria
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import InputError, SolveError
@@ -201,8 +201,7 @@ def corrected_laplace(
         method="corrected-laplace",
         minus_lnJ=-(profile.log_j + term.value),
         stderr=term.stderr,
-        links=link_shares({chart.link: chart.log_j + term.value for chart in profile.charts}),
-        bias_bound=bias,
+        links=profile.shares({chart.link: chart.log_j + term.value for chart in profile.charts}),
         samples=2 * term.pairs,
         seconds=time.perf_counter() - began,
         warnings=tuple(warnings),

@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dnacheck.cyclization.laplace.isolated import log_prefactor
+from dnacheck.cyclization.laplace.isolated import held_components, log_prefactor
 from dnacheck.cyclization.laplace.kernels import register as rk
 from dnacheck.cyclization.laplace.kernels.gaussian import ROWS, SliceFactors
+from dnacheck.equilibria.boundary import AnyBoundary
+from dnacheck.equilibria.ring import RING
 from dnacheck.model.chain import Chain
 from dnacheck.model.chain_kernels import HingeSteps
 from dnacheck.numerics.outcome import InputError
@@ -109,21 +111,40 @@ def steps_in_RT(chain: Chain) -> HingeSteps:
 
 
 class Constrainer:
-    """Register-constrained minima of one molecule and link; keeps what every call needs."""
+    """Register-constrained minima of one molecule and link; keeps what every call needs.
 
-    def __init__(self, chain: Chain, link: int, options: RegisterOptions) -> None:
+    Parameters
+    ----------
+    link : int
+        Of a ring; of other ends, what tells families of shapes apart.
+    boundary : Ring, NickedRing, HingedRing or Loop
+    turns : float, optional
+        Of the rows that tell the register; by default the link.
+    """
+
+    def __init__(
+        self,
+        chain: Chain,
+        link: int,
+        options: RegisterOptions,
+        boundary: AnyBoundary = RING,
+        turns: float | None = None,
+    ) -> None:
         self.chain, self.link, self.options = chain, link, options
+        self.boundary = boundary.for_chain(chain)
+        self.turns = float(link if turns is None else turns)
         self.steps = steps_in_RT(chain)
         self.flexibility = chain.flexibility / chain.energy_scale_RT
         n = chain.n_steps
         self.along, self.across = np.empty((n, 3)), np.empty((n, 3))
-        rk.register_functionals(chain.ground, chain.form_code, link, self.along, self.across)
+        rk.register_functionals(chain.ground, chain.form_code, self.turns, self.along, self.across)
         scale = chain.energy_scale_RT
+        held = held_components(boundary)
         self.constant = (
-            log_prefactor(chain)
-            - 3.0 * math.log(scale / (2.0 * math.pi))
+            log_prefactor(chain, boundary)
+            - 0.5 * held * math.log(scale / (2.0 * math.pi))
             + 1.5 * chain.n_free * math.log(scale)
-            - 3.5 * math.log(2.0 * math.pi)
+            - 0.5 * (held + 1) * math.log(2.0 * math.pi)
         )
 
     def minimum(
@@ -149,6 +170,7 @@ class Constrainer:
             register,
             self.options.tolerance,
             self.options.max_iterations,
+            self.boundary,
         )
         figures = np.zeros(rk.N_FIGURES)
         code = rk.constrained_minimum(self.steps, problem, angles, multipliers, factors, figures)

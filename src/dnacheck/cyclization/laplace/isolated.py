@@ -2,11 +2,14 @@
 
 With n = 3N angles, energies in RT and lengths in Å, one minimum contributes
 
-    J = 8 pi^2 exp(-E) sqrt(det(K / 2 pi)) (2 pi)^((n - 6)/2) / sqrt(|det KKT|),
+    J = w exp(-E) sqrt(det(K / 2 pi)) (2 pi)^((n - m)/2) / sqrt(|det KKT|),
 
-where |det KKT| = det(Z^T H Z) det(G G^T): H is the Hessian of the Lagrangian, G the 6 x n
-Jacobian of closure, Z an orthonormal basis of its null space. Steps as the unit of length and
-reduced energies leave the factor (s / 2 pi)^3 / l^3, with s RT per reduced unit and l the rise.
+where |det KKT| = det(Z^T H Z) det(G G^T): H is the Hessian of the Lagrangian, G the m x n
+Jacobian of the m components that the boundary holds (6 for a ring), Z an orthonormal basis of its
+null space. The density of orientations is against the normalised measure of those held: w is 8 pi^2
+for all three, 4 pi for an axis (m = 5, a nick), 1 for none (m = 3, a hinge). Steps as the unit of
+length and reduced energies leave the factor (s / 2 pi)^(m/2) / l^3, with s RT per reduced unit and
+l the rise.
 Derived in docs/theory/jfactors.md.
 """
 
@@ -25,11 +28,12 @@ from dnacheck.cyclization.result import (
     JStatus,
     link_shares,
 )
+from dnacheck.equilibria.boundary import AnyBoundary, HingedRing, NickedRing, Pull
 from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
 from dnacheck.equilibria.discrete.spectrum import ProjectedInverse
-from dnacheck.equilibria.ring import Equilibria, Equilibrium
+from dnacheck.equilibria.ring import RING, Equilibria, Equilibrium
 from dnacheck.model.chain import Chain
-from dnacheck.numerics.outcome import SolveError
+from dnacheck.numerics.outcome import InputError, SolveError
 
 Array = NDArray[np.float64]
 
@@ -38,14 +42,37 @@ SOFT_REGISTER = 0.75
 beyond it the Gaussian differs from the integral over the register by 0.1 to 0.5 in ln J."""
 
 
-def log_prefactor(chain: Chain) -> float:
-    """ln of 8 pi^2 sqrt(det K) (s / 2 pi)^3 / l^3 in mol/L, K reduced; see the module's text."""
+def held_components(boundary: AnyBoundary) -> int:
+    """How many components of the end a boundary holds: 6, 5 or 3.
+
+    Raises
+    ------
+    InputError
+        A boundary with loads or free translations, whose end has no place to be found at.
+    """
+    if isinstance(boundary, Pull):
+        raise InputError(
+            "a pulled chain has no J factor, its end is nowhere in particular; take a ring, a "
+            "nicked or hinged ring, or a loop"
+        )
+    if isinstance(boundary, NickedRing):
+        return 5
+    return 3 if isinstance(boundary, HingedRing) else 6
+
+
+_MEASURE = {6: 8.0 * math.pi**2, 5: 4.0 * math.pi, 3: 1.0}
+"""Volume of the orientations that so many held components fix."""
+
+
+def log_prefactor(chain: Chain, boundary: AnyBoundary = RING) -> float:
+    """ln of w sqrt(det K) (s / 2 pi)^(m/2) / l^3 in mol/L, K reduced; see the module's text."""
+    held = held_components(boundary)
     scale = chain.energy_scale_RT / (2.0 * math.pi)
     log_det_stiffness = float(np.linalg.slogdet(chain.stiffness[~chain.bound])[1].sum())
     return (
-        math.log(8.0 * math.pi**2)
+        math.log(_MEASURE[held])
         + 0.5 * log_det_stiffness
-        + 3.0 * math.log(scale)
+        + 0.5 * held * math.log(scale)
         - 3.0 * math.log(chain.rise_A)
         + math.log(PER_CUBIC_ANGSTROM_IN_MOLAR)
     )
@@ -53,22 +80,36 @@ def log_prefactor(chain: Chain) -> float:
 
 def laplace_log_j(ring: Equilibrium) -> float:
     """ln J (mol/L) that Laplace's approximation gives one minimum."""
-    return log_prefactor(ring.chain) - ring.energy_RT - 0.5 * ring.log_abs_det_kkt
+    return log_prefactor(ring.chain, ring.boundary) - ring.energy_RT - 0.5 * ring.log_abs_det_kkt
 
 
-def register_spread(chain: Chain, link: int, angles: Array, multipliers: Array) -> float:
+def register_spread(
+    chain: Chain,
+    turns: float,
+    angles: Array,
+    multipliers: Array,
+    boundary: AnyBoundary = RING,
+) -> float:
     """Standard deviation of the register of a ring in Laplace's Gaussian, in radians.
 
-    ``multipliers`` (6,) are reduced. Infinite for a zero mode, such as a straight molecule has.
+    ``turns`` are those of the register's rows, the link of a ring; ``multipliers`` (6,) are
+    reduced. Infinite for a zero mode, such as a straight molecule has.
     """
     n = chain.n_steps
     along, across = np.empty((n, 3)), np.empty((n, 3))
-    register_functionals(chain.ground, chain.form_code, link, along, across)
+    register_functionals(chain.ground, chain.form_code, float(turns), along, across)
     register, extent = register_of(angles, along, across)
     row = (math.cos(register) * across - math.sin(register) * along) / extent
-    inverse = ProjectedInverse(chain, angles, multipliers)
+    inverse = ProjectedInverse(chain, angles, multipliers, boundary.for_chain(chain))
     variance = float(np.sum(row * inverse(row))) / chain.energy_scale_RT
     return math.sqrt(variance) if 0.0 < variance < math.inf else math.inf
+
+
+def register_turns(ring: Equilibrium) -> float:
+    """Turns of the rows that tell a shape's register: the link, or else the sum of its twists."""
+    if ring.ring_link is not None:
+        return float(ring.ring_link)
+    return float(ring.angles[:, 0].sum()) / (2.0 * math.pi)
 
 
 def require_rings(search: Equilibria) -> Equilibria:
@@ -115,20 +156,23 @@ def laplace(target: Chain | Equilibria, options: SearchOptions | None = None) ->
     require_rings(search)
     chain = search.chain
     minima = [ring for ring in search.equilibria if ring.stable]
-    neutral = [ring.link for ring in search.equilibria if ring.stable is None]
+    neutral = [ring for ring in search.equilibria if ring.stable is None]
     if neutral:
+        where = "" if neutral[0].ring_link is None else f" at link {neutral[0].ring_link}"
         raise SolveError(
-            f"J factor of {chain.name}: the register is free at link {neutral[0]}, where Laplace's "
+            f"J factor of {chain.name}: the register is free{where}, where Laplace's "
             "approximation diverges; use the register-integrated one or sample",
             search,
         )
-    parts: dict[int, float] = {}
+    parts: dict[int | None, float] = {}
     for ring in minima:
         value = laplace_log_j(ring)
-        parts[ring.link] = float(np.logaddexp(parts.get(ring.link, -math.inf), value))
+        parts[ring.ring_link] = float(np.logaddexp(parts.get(ring.ring_link, -math.inf), value))
     total = float(np.logaddexp.reduce(list(parts.values())))
     lowest = minima[0]
-    spread = register_spread(chain, lowest.link, lowest.angles, lowest.multipliers)
+    spread = register_spread(
+        chain, register_turns(lowest), lowest.angles, lowest.multipliers, search.boundary
+    )
     soft = not spread <= SOFT_REGISTER
     warnings = list(chain.warnings)
     if soft:
@@ -142,7 +186,7 @@ def laplace(target: Chain | Equilibria, options: SearchOptions | None = None) ->
         method="laplace",
         minus_lnJ=-total,
         stderr=0.0,
-        links=link_shares(parts),
+        links=link_shares({link: v for link, v in parts.items() if link is not None}),
         seconds=time.perf_counter() - began,
         warnings=tuple(warnings),
         status=JStatus.SOFT_REGISTER if soft else JStatus.NO_ERROR_ESTIMATE,

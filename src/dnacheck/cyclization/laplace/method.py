@@ -65,7 +65,7 @@ class Laplace(Method):
         if not self.register:
             from dnacheck.cyclization.laplace.isolated import laplace
 
-            return laplace(rings_of(target))
+            return laplace(rings_of(target, any_end=True))
         profile = register_profile_of(target)
         if not self.order:
             from dnacheck.cyclization.laplace.register import register_laplace

@@ -28,14 +28,14 @@ from dnacheck.cyclization.laplace.constrained_minimum import (
     Constrainer,
     RegisterOptions,
 )
-from dnacheck.cyclization.laplace.isolated import register_spread
+from dnacheck.cyclization.laplace.isolated import register_spread, register_turns
 from dnacheck.cyclization.laplace.kernels import register as rk
 from dnacheck.cyclization.laplace.kernels.gaussian import ROWS
-from dnacheck.cyclization.result import JFactor, JStatus, link_shares
+from dnacheck.cyclization.result import JFactor, JStatus, LinkShare, link_shares
 from dnacheck.equilibria.discrete.kernels.search import best_register
 from dnacheck.equilibria.discrete.kernels.starts import fill_circle
 from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
-from dnacheck.equilibria.ring import Equilibria
+from dnacheck.equilibria.ring import RING, Equilibria
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import SolveError
 
@@ -54,6 +54,9 @@ class Chart:
     Attributes
     ----------
     link : int
+        Of a ring; of other ends, what tells families of shapes apart.
+    turns : float
+        Of the rows that tell the register.
     registers : int
         Number of grid points on the whole circle; only those that matter have rings.
     rings : tuple of ConstrainedMinimum
@@ -65,6 +68,7 @@ class Chart:
     """
 
     link: int
+    turns: float
     registers: int
     rings: tuple[ConstrainedMinimum, ...]
     rule_error: float
@@ -122,9 +126,19 @@ class RegisterProfile:
         """ln of J (mol/L) by register-integrated Laplace."""
         return _log_sum([chart.log_j for chart in self.charts])
 
+    def shares(
+        self, log_parts: dict[int, float], errors: dict[int, float] | None = None
+    ) -> tuple[LinkShare, ...]:
+        """Shares of the links from ln J and error of each; none where the ends have no link."""
+        return link_shares(log_parts, errors) if self.search.boundary == RING else ()
+
     def slices(self) -> list[Slice]:
         """Every minimum of every chart."""
         covered = np.array([chart.link for chart in self.charts], dtype=np.int64)
+        boundary = self.search.boundary
+        held = boundary.for_chain(self.chain)
+        # Families of free ends are told apart by their twist, counted from this one's.
+        origin = self.charts[0].turns - self.charts[0].link
         return [
             Slice(
                 ring,
@@ -136,6 +150,9 @@ class RegisterProfile:
                     chart.link,
                     covered,
                     chart.rivals(ring),
+                    held,
+                    boundary == RING,
+                    origin,
                 ),
                 ring.log_density + math.log(chart.spacing),
             )
@@ -159,24 +176,30 @@ def _log_sum(values: list[float]) -> float:
     return float(np.logaddexp.reduce(values)) if values else -math.inf
 
 
-def _seeds(search: Equilibria) -> dict[int, list[tuple[Array, Array]]]:
-    """Angles and multipliers (RT) to start from, by link, lowest first.
+def _seeds(search: Equilibria) -> tuple[dict[int, list[tuple[Array, Array]]], float]:
+    """Angles and multipliers (RT) to start from, by link, lowest first; and turns of link 0.
+
+    Ends without a link are told apart by the turns of their twist beyond that of the lowest.
 
     A search leaves out links whose rings are not isolated minima, as in a straight molecule; the
     planar circle serves for those.
     """
     chain = search.chain
     seeds: dict[int, list[tuple[Array, Array]]] = {}
+    origin = 0.0
+    if search.boundary != RING and search.equilibria:
+        origin = register_turns(search.lowest)
     for ring in search.equilibria:
         force = np.append(chain.energy_scale_RT * ring.multipliers, 0.0)
-        seeds.setdefault(ring.link, []).append((np.array(ring.angles), force))
+        link = round(register_turns(ring) - origin)
+        seeds.setdefault(link, []).append((np.array(ring.angles), force))
     for link in search.links_searched:
         if link not in seeds:
             circle = np.empty((chain.n_steps, 3))
             register = best_register(chain.arrays, link)
             fill_circle(chain.ground, chain.form_code, link, register, circle)
             seeds[link] = [(circle, np.zeros(ROWS))]
-    return seeds
+    return seeds, origin
 
 
 def _height(constrainer: Constrainer, seeds: list[tuple[Array, Array]]) -> float:
@@ -270,7 +293,7 @@ def _chart(
             break
         registers *= 2
     total = sum(math.exp(ring.log_density - top) for ring in rings)
-    return Chart(constrainer.link, registers, tuple(rings), error, lost / total)
+    return Chart(constrainer.link, constrainer.turns, registers, tuple(rings), error, lost / total)
 
 
 def register_profile(
@@ -294,8 +317,10 @@ def register_profile(
     options = options or RegisterOptions()
     search = find_rings(target, search_options) if isinstance(target, Chain) else target
     chain = search.chain
-    seeds = _seeds(search)
-    constrainers = {link: Constrainer(chain, link, options) for link in seeds}
+    seeds, origin = _seeds(search)
+    constrainers = {
+        link: Constrainer(chain, link, options, search.boundary, origin + link) for link in seeds
+    }
     heights = {link: _height(constrainers[link], seeds[link]) for link in seeds}
     best = max(heights.values(), default=-math.inf)
     charts: list[Chart] = []
@@ -310,7 +335,10 @@ def register_profile(
             continue
         constrainer = constrainers[link]
         spreads = [
-            register_spread(chain, link, q, m[:6] / chain.energy_scale_RT) for q, m in seeds[link]
+            register_spread(
+                chain, constrainer.turns, q, m[:6] / chain.energy_scale_RT, search.boundary
+            )
+            for q, m in seeds[link]
         ]
         chart = _chart(constrainer, seeds[link], spreads)
         if chart is None:
@@ -359,7 +387,7 @@ def register_laplace(
         method="register-laplace",
         minus_lnJ=-profile.log_j,
         stderr=0.0,
-        links=link_shares({chart.link: chart.log_j for chart in profile.charts}),
+        links=profile.shares({chart.link: chart.log_j for chart in profile.charts}),
         seconds=seconds if target is not profile else profile.seconds,
         warnings=(*chain.warnings, *profile.warnings),
         status=JStatus.NO_ERROR_ESTIMATE,

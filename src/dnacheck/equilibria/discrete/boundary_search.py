@@ -86,6 +86,7 @@ def find_equilibria(
         failed_starts=failed,
         seconds=time.perf_counter() - began,
         status=Status.CONVERGED if found else Status.NOT_FOUND,
+        boundary=boundary,
     )
 
 

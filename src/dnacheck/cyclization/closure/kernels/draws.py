@@ -26,6 +26,7 @@ from dnacheck.cyclization.closure.kernels.projection import (
     same_solution,
 )
 from dnacheck.cyclization.laplace.kernels.gaussian import dot, draw_closed
+from dnacheck.equilibria.boundary_kernels import Boundary
 from dnacheck.numerics.curve_topology import link_of_ring
 
 COUNTED = 0
@@ -55,6 +56,11 @@ class SliceCentre(NamedTuple):
         Links that have charts of their own.
     rivals : ndarray, shape (R, N, 3)
         Other minima of the same link and register; a shape nearer to one of them is theirs.
+    boundary : Boundary
+    topological : bool
+        Whether shapes have a link: the end is that of a ring. Otherwise ``link`` counts turns of
+        the total twist from ``turns`` on.
+    turns : float
     """
 
     angles: Any
@@ -64,6 +70,9 @@ class SliceCentre(NamedTuple):
     link: int
     covered: Any
     rivals: Any
+    boundary: Boundary
+    topological: bool
+    turns: float
 
 
 class Probes(NamedTuple):
@@ -139,6 +148,24 @@ def chart_of_link(link: int, covered: Any) -> int:
     return best
 
 
+@njit(cache=True, nogil=True)
+def _link_and_chart(shape: Any, centre: Any) -> tuple[int, int]:
+    """Link of a shape, or what stands for it where the end is free, and who counts the shape."""
+    covered = centre.covered
+    if centre.topological:
+        found = link_of_ring(shape.centres, shape.frames)[0]
+        return found, chart_of_link(found, covered)
+    total = 0.0
+    for s in range(shape.angles.shape[0]):
+        total += shape.angles[s, 0]
+    found = int(round(total / (2.0 * math.pi) - centre.turns))
+    nearest = covered[0]
+    for i in range(covered.shape[0]):
+        if abs(covered[i] - found) < abs(nearest - found):
+            nearest = covered[i]
+    return found, nearest
+
+
 @njit(cache=True, nogil=True, fastmath={"contract"})
 def _log_weight(
     shape: Any, det: float, quadratic: float, steps: Any, centre: Any
@@ -148,8 +175,8 @@ def _log_weight(
     found = dot(centre.direction.reshape(angles.size), angles.reshape(angles.size))
     if not found > 0.0:
         return -math.inf, OTHER_SIDE, NO_LINK
-    shape_link = link_of_ring(shape.centres, shape.frames)[0]
-    if chart_of_link(shape_link, centre.covered) != centre.link:
+    shape_link, chart = _link_and_chart(shape, centre)
+    if chart != centre.link:
         return -math.inf, OTHER_CHART, shape_link
     if centre.rivals.shape[0] > 0:
         own = _distance(angles, centre.angles, steps.stiffness)
@@ -184,7 +211,7 @@ def draw_pairs(rng: Any, steps: Any, centre: Any, factors: Any, probes: Any, rec
     n = centre.angles.shape[0]
     m = 3 * n
     form = steps.form
-    shape = empty_shape(n, form)
+    shape = empty_shape(n, form, centre.boundary)
     normals = np.empty((n, 3))
     x = np.empty((n, 3))
     draw = x.reshape(m)

@@ -15,11 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from dnacheck.equilibria.discrete.kernels.closure import (
-    closure_jacobian,
-    closure_residual,
-    linearise,
-)
+from dnacheck.equilibria.boundary_kernels import Boundary, end_residual, place_start
+from dnacheck.equilibria.discrete.kernels.closure import closure_jacobian, linearise_placed
 from dnacheck.model.chain_kernels import WEDGE
 
 CLOSED = 1e-9
@@ -41,6 +38,8 @@ class Shape(NamedTuple):
     axes : ndarray, shape (N, 3, 3)
     halves : ndarray, shape (N, 5, 3), or (0, 5, 3) for the wedge
     jacobian : ndarray, shape (6, 3N)
+    boundary : Boundary
+        What the end is held to.
     """
 
     angles: Any
@@ -49,19 +48,23 @@ class Shape(NamedTuple):
     axes: Any
     halves: Any
     jacobian: Any
+    boundary: Boundary
 
 
 @njit(cache=True, nogil=True)
-def empty_shape(n: int, form: int) -> Shape:
-    """Room for a shape of ``n`` steps."""
-    return Shape(
+def empty_shape(n: int, form: int, boundary: Boundary) -> Shape:
+    """Room for a shape of ``n`` steps, placed for a boundary."""
+    shape = Shape(
         np.empty((n, 3)),
         np.empty((n + 1, 3)),
         np.empty((n + 1, 3, 3)),
         np.empty((n, 3, 3)),
         np.empty((n if form != WEDGE else 0, 5, 3)),
         np.empty((6, 3 * n)),
+        boundary,
     )
+    place_start(boundary, shape.centres[0], shape.frames[0])
+    return shape
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -149,6 +152,8 @@ def newton_projection(
     """
     n = shape.angles.shape[0]
     centres, frames, axes = shape.centres, shape.frames, shape.axes
+    fixed = shape.boundary.fixed
+    turn = np.zeros(1)
     closure = np.empty(6)
     matrix = np.empty((6, 6))
     step = np.empty(6)
@@ -159,8 +164,8 @@ def newton_projection(
     det = 0.0
     for iteration in range(most):
         _displace(centre, draw, t, directions, y, flat)
-        linearise(shape.angles, form, centres, frames, axes, shape.halves)
-        closure_residual(centres, frames, closure)
+        linearise_placed(shape.angles, form, centres, frames, axes, shape.halves)
+        end_residual(shape.boundary, centres[n], frames[n], turn, closure)
         size = 0.0
         for i in range(6):
             size += (closure[i] / (n if i < 3 else 1.0)) ** 2
@@ -177,6 +182,10 @@ def newton_projection(
             return -1, 0.0
         closure_jacobian(centres, axes, shape.jacobian)
         _transverse(shape.jacobian, directions, matrix)
+        for i in range(6):
+            if not fixed[i]:
+                for j in range(6):
+                    matrix[i, j] = 1.0 if i == j else 0.0
         det = solve_six(matrix, closure, step)
         if not damped and not det > 0.0:
             return -1, 0.0

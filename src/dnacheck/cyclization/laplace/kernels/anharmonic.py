@@ -32,7 +32,7 @@ def scaled_log_weights(
     """
     n = centre.angles.shape[0]
     m = 3 * n
-    shape = empty_shape(n, steps.form)
+    shape = empty_shape(n, steps.form, centre.boundary)
     angles = shape.angles
     normals = np.empty((n, 3))
     x = np.empty((n, 3))

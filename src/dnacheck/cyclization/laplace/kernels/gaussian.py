@@ -2,7 +2,8 @@
 
 A slice holds seven linear functions of the angles at first order: the six of closure (rows b and a
 of :mod:`dnacheck.equilibria.discrete.kernels.closure`) and the register row v. Its rows are G (7,
-3N). The Hessian H of the Lagrangian is indefinite, but M = H + G^T R G is positive for a large
+3N); those of components that a boundary leaves free constrain nothing and stay as generators. The
+Hessian H of the Lagrangian is indefinite, but M = H + G^T R G is positive for a large
 enough positive 7 x 7 matrix R and agrees with H on the null space of G. Between angles j < k of
 different steps
 
@@ -96,6 +97,22 @@ def invert_small(matrix: Any, out: Any) -> float:
                 total += inv[k, i] * inv[k, j]
             out[i, j] = total
     return log_det
+
+
+@njit(cache=True, nogil=True)
+def drop_free(fixed: Any, matrix: Any, free: float) -> None:
+    """Rows and columns of a system of the seven rows become empty for components that are free.
+
+    ``free`` takes the diagonal: 1 leaves determinant and inverse of the rest as they are, 0 leaves
+    nothing of the component. ``fixed`` (6,) is that of a boundary.
+    """
+    for i in range(6):
+        if not fixed[i]:
+            for j in range(matrix.shape[1]):
+                matrix[i, j] = 0.0
+            for j in range(ROWS):
+                matrix[j, i] = 0.0
+            matrix[i, i] = free
 
 
 @njit(cache=True, nogil=True)

@@ -1,4 +1,4 @@
-"""Compiled minima of a ring whose register is constrained.
+"""Compiled minima of a chain under a boundary whose register is constrained.
 
 The register is that of :mod:`dnacheck.equilibria.discrete.kernels.registers`: the shapes of one
 register form a half hyperplane.
@@ -17,17 +17,15 @@ from dnacheck.cyclization.laplace.kernels.gaussian import (
     WIDTH,
     combine,
     constraint_rows,
+    drop_free,
     factorise_slice,
     invert_small,
     products,
     solve_slice,
     stiff_columns,
 )
-from dnacheck.equilibria.discrete.kernels.closure import (
-    closure_residual,
-    energy_gradient,
-    linearise,
-)
+from dnacheck.equilibria.boundary_kernels import Boundary, end_residual, place_start
+from dnacheck.equilibria.discrete.kernels.closure import energy_gradient, linearise_placed
 from dnacheck.equilibria.discrete.kernels.registers import (
     register_functionals as register_functionals,
 )
@@ -68,6 +66,8 @@ class RegisterProblem(NamedTuple):
         Largest entry of the gradient of the Lagrangian, RT per radian.
     most : int
         Iterations.
+    boundary : Boundary
+        What the end is held to; no loads.
     """
 
     inverse_stiffness: Any
@@ -76,6 +76,7 @@ class RegisterProblem(NamedTuple):
     register: float
     tolerance: float
     most: int
+    boundary: Boundary
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -119,6 +120,9 @@ def constrained_minimum(
     small = np.empty((ROWS, WIDTH))
     new = np.empty(ROWS)
     step = np.empty((n, 3))
+    turn = np.zeros(1)
+    boundary = problem.boundary
+    place_start(boundary, centres[0], frames[0])
     c, sn = math.cos(problem.register), math.sin(problem.register)
     for s in range(n):
         for j in range(3):
@@ -126,10 +130,10 @@ def constrained_minimum(
             moving[s, j] = 0.0 if is_bound(steps.stiffness, s) else row[s, j]
     hold_ground(steps, angles)
     for iteration in range(problem.most + 1):
-        linearise(angles, form, centres, frames, axes, halves)
+        linearise_placed(angles, form, centres, frames, axes, halves)
         still_axes(steps.stiffness, axes)
         energy = energy_gradient(angles, steps.ground, steps.stiffness, gradient)
-        closure_residual(centres, frames, closure)
+        end_residual(boundary, centres[n], frames[n], turn, closure)
         constraint_rows(centres, axes, moving, rows)
         closure[6] = 0.0
         extent = 0.0
@@ -158,8 +162,10 @@ def constrained_minimum(
             return NOT_CONVERGED
         stiff_columns(rows, problem.inverse_stiffness, columns)
         products(rows, columns, gram)
+        drop_free(boundary.fixed, gram, 1.0)
         if math.isnan(invert_small(gram[:, :ROWS], weight)):
             return NOT_FINITE
+        drop_free(boundary.fixed, weight, 0.0)
         rise = _FIRST_PENALTY
         log_det = math.nan
         for _ in range(_PENALTY_RISES):
@@ -188,9 +194,11 @@ def constrained_minimum(
                 solved[s, j, ROWS] = gradient[s, j]
         solve_slice(right, z, root, solved)
         products(rows, solved, small)
+        drop_free(boundary.fixed, small, 1.0)
         log_small = invert_small(small[:, :ROWS], schur)
         if math.isnan(log_small):
             return NOT_FINITE
+        drop_free(boundary.fixed, schur, 0.0)
         if done:
             figures[LOG_DET_KKT] = log_det + log_small
             combine(solved, schur, ROWS, factors.projector)

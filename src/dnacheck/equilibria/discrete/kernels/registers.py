@@ -31,8 +31,8 @@ class KnownRegister(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def register_functionals(ground: Any, form: int, link: int, along: Any, across: Any) -> None:
-    """Rows of Re S and Im S, each (N, 3), for a ring of ``link`` turns."""
+def register_functionals(ground: Any, form: int, link: float, along: Any, across: Any) -> None:
+    """Rows of Re S and Im S, each (N, 3), for a chain of ``link`` turns, not always whole ones."""
     n = ground.shape[0]
     total = 0.0
     for s in range(n):
