@@ -15,7 +15,6 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from dnacheck.equilibria.boundary import AnyBoundary, HingedRing, Loop, NickedRing, Pull
 from dnacheck.equilibria.discrete.bound_search import hold_found, refuse_torn_guests
@@ -153,6 +152,9 @@ def _approach(
 
     In one step if Newton's method manages it, else in ever more; the turn is the shortest.
     """
+    # Loops alone need it, and loading it takes as long as a search.
+    from scipy.spatial.transform import Rotation
+
     end = np.array(target.position_A) / chain.rise_A
     turn = Rotation.from_matrix(frame.T @ np.array(target.rotation)).as_rotvec()
     reached, pieces = 0.0, 1
