@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from dnacheck.equilibria.discrete.kernels.cut import fill_shape, rotated
+from dnacheck.equilibria.discrete.kernels.cut import fill_shape
 from dnacheck.equilibria.discrete.kernels.newton import (
     ENERGY,
     LOG_DET_KKT,
@@ -17,7 +17,7 @@ from dnacheck.equilibria.discrete.kernels.newton import (
     NewtonLimits,
 )
 from dnacheck.equilibria.discrete.kernels.search import Minima, SearchPlan, search_as_cut
-from dnacheck.model.cut import least_rotation
+from dnacheck.equilibria.discrete.search import room
 from dnacheck.numerics.curve_topology import edge_frames, link_of_ring
 
 # Positions of the figures of a scanned molecule.
@@ -25,12 +25,37 @@ LOWEST_ENERGY, LOWEST_LINK, LOG_J, MINIMA, FAILED_STARTS, FREE_REGISTERS = range
 N_SCAN_FIGURES = 6
 
 
+def room_for(plan: SearchPlan, n_steps: int, coordinates: int) -> Minima:
+    """Room for the minima of one molecule."""
+    most = room(plan)
+    return Minima(
+        np.empty((most, n_steps, coordinates)),
+        np.empty((most, 6)),
+        np.empty((most, N_FIGURES)),
+        np.zeros(len(plan.links), dtype=np.bool_),
+    )
+
+
+@njit(cache=True, nogil=True)
+def link_of_shape(ring: Any, angles: Any) -> int:
+    """Link of a closed shape (N, c); of rigid steps that about the edges between their centres."""
+    n = ring.ground.shape[0]
+    centres = np.empty((n + 1, 3))
+    frames = np.empty((n + 1, 3, 3))
+    fill_shape(ring, angles, centres, frames)
+    if ring.ground.shape[1] > 3:
+        along = np.empty((n + 1, 3, 3))
+        edge_frames(centres, frames, along)
+        frames = along
+    return link_of_ring(centres, frames)[0]
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def scan_molecule(
-    steps: Any,
+    ring: Any,
     plan: SearchPlan,
     limits: NewtonLimits,
-    most: int,
+    minima: Minima,
     scale: float,
     constant: float,
     figures: Any,
@@ -39,8 +64,9 @@ def scan_molecule(
 
     Parameters
     ----------
+    ring : steps of the canonical cut.
     plan, limits : as :func:`dnacheck.equilibria.discrete.search.find_rings` has them.
-    most : room for minima.
+    minima : filled with the minima found.
     scale : RT per reduced unit.
     constant : ln J = constant - E - ln det KKT / 2, see
         :mod:`dnacheck.cyclization.laplace.isolated`.
@@ -51,14 +77,6 @@ def scan_molecule(
     -------
     found : whether there is a stable ring.
     """
-    n = steps.ground.shape[0]
-    ring = rotated(steps, least_rotation(steps))
-    minima = Minima(
-        np.empty((most, n, steps.ground.shape[1])),
-        np.empty((most, 6)),
-        np.empty((most, N_FIGURES)),
-        np.zeros(len(plan.links), dtype=np.bool_),
-    )
     found, _, failed = search_as_cut(ring, plan, limits, minima)
     figures[:] = math.nan
     figures[MINIMA], figures[FAILED_STARTS] = found, failed
@@ -72,17 +90,9 @@ def scan_molecule(
         free += 1 if figure[NEUTRAL] > 0.0 else 0
         if figure[ENERGY] < minima.figures[lowest, ENERGY]:
             lowest = m
-    centres = np.empty((n + 1, 3))
-    frames = np.empty((n + 1, 3, 3))
-    fill_shape(ring, minima.angles[lowest], centres, frames)
-    if steps.ground.shape[1] > 3:
-        # Of rigid steps the link is that about the edges between their centres.
-        along = np.empty((n + 1, 3, 3))
-        edge_frames(centres, frames, along)
-        frames = along
     best = parts.max()
     figures[LOWEST_ENERGY] = minima.figures[lowest, ENERGY]
-    figures[LOWEST_LINK] = link_of_ring(centres, frames)[0]
+    figures[LOWEST_LINK] = link_of_shape(ring, minima.angles[lowest])
     figures[LOG_J] = best + math.log(np.exp(parts - best).sum())
     figures[FREE_REGISTERS] = free
     return True

@@ -1,4 +1,4 @@
-"""Lowest ring and Laplace J factor of every record of a sequence file, resumable and in order.
+"""Lowest ring and J factor of every record of a sequence file, resumable and in order.
 
 Rows are appended to the CSV file in the order of the input; a state file beside it (its name with
 ``.state.json``) holds the settings and the fingerprint of the input. A scan that was killed at any
@@ -27,21 +27,31 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from dnacheck import __version__
+from dnacheck.cyclization.half_chain.proposals import EASY_RT
 from dnacheck.cyclization.laplace.isolated import log_prefactor
-from dnacheck.equilibria.discrete.search import room, search_plan
+from dnacheck.cyclization.laplace.kernels.quick import KnownMinima
+from dnacheck.cyclization.laplace.quick import QUICK_WINDOW_RT, QuickJ, quick_of_minima
+from dnacheck.equilibria.discrete.kernels.cut import rotated
+from dnacheck.equilibria.discrete.kernels.newton import ENERGY
+from dnacheck.equilibria.discrete.search import search_plan
 from dnacheck.equilibria.discrete.solve import NewtonOptions
 from dnacheck.io.files import atomic_write
 from dnacheck.io.sequences import Record, SequenceSource
-from dnacheck.model.chain import build_chain
+from dnacheck.model.chain import Chain, build_chain
+from dnacheck.model.chain_kernels import HingeSteps
+from dnacheck.model.cut import least_rotation
 from dnacheck.model.parameters import ParameterSet, load_parameters
 from dnacheck.model.sequence import parse_sequence
 from dnacheck.numerics.outcome import InputError
 from dnacheck.scanning import kernels as sk
 
-COLUMNS = ("name", "n_bp", "link", "energy_RT", "energy_reduced", "minus_lnJ", "status")
+COLUMNS = ("name", "n_bp", "link", "energy_RT", "energy_reduced", "minus_lnJ", "status", "quality")
 _STATUS = COLUMNS.index("status")
 STATUS_FOUND = "ok"
 STATUS_NO_RING = "no stable ring found at any link searched"
+QUALITY_LAPLACE = "laplace only"
+"""Of a row whose J is Laplace's alone: rigid steps, and molecules too long for a picture of small
+fluctuations about a ring."""
 STATUS_FREE = "free register, no Laplace value; use dnacheck jfactor"
 
 _BLOCK = 8
@@ -113,32 +123,47 @@ def scan_row(name: str, letters: str, arguments: Mapping[str, Any]) -> list[str]
             raise InputError(f"{len(letters)} base pairs are more than {_LONGEST}; leave it out")
         chain = build_chain(parse_sequence(letters, name), **arguments)
     except InputError as error:
-        return [*cells, " ".join(str(error).split())]
+        return [*cells, " ".join(str(error).split()), ""]
     figures = np.empty(sk.N_SCAN_FIGURES)
     scale = chain.energy_scale_RT
     plan = search_plan(chain)
+    ring = rotated(chain.arrays, least_rotation(chain.arrays))
+    minima = sk.room_for(plan, chain.n_steps, chain.ground.shape[1])
     found = sk.scan_molecule(
-        chain.arrays,
-        plan,
-        NewtonOptions().limits,
-        room(plan),
-        scale,
-        log_prefactor(chain),
-        figures,
+        ring, plan, NewtonOptions().limits, minima, scale, log_prefactor(chain), figures
     )
     if not found or not np.isfinite(figures).all():
-        return [*cells, STATUS_NO_RING]
+        return [*cells, STATUS_NO_RING, ""]
     energy = float(figures[sk.LOWEST_ENERGY])
-    free = figures[sk.FREE_REGISTERS] > 0
+    quick = _quick(chain, ring, minima, int(figures[sk.MINIMA]))
+    free = quick is None and figures[sk.FREE_REGISTERS] > 0
+    log_j = figures[sk.LOG_J] if quick is None else quick.log_j
     return [
         name,
         str(chain.n_steps),
         str(int(figures[sk.LOWEST_LINK])),
         f"{energy * scale:.6f}",
         f"{energy:.8f}",
-        "" if free else f"{-figures[sk.LOG_J]:.6f}",
+        "" if free else f"{-log_j:.6f}",
         STATUS_FREE if free else STATUS_FOUND,
+        "" if free else QUALITY_LAPLACE if quick is None else quick.quality,
     ]
+
+
+def _quick(chain: Chain, ring: Any, minima: Any, found: int) -> QuickJ | None:
+    """ln J beyond Laplace's value; None where only that is known."""
+    energies = chain.energy_scale_RT * minima.figures[:found, ENERGY]
+    if not isinstance(ring, HingeSteps) or energies.min() < EASY_RT:
+        return None
+    near = np.flatnonzero(energies < energies.min() + QUICK_WINDOW_RT)
+    near = near[np.argsort(energies[near], kind="stable")]
+    links = [sk.link_of_shape(ring, minima.angles[k]) for k in near]
+    known = KnownMinima(
+        np.ascontiguousarray(minima.angles[near]),
+        chain.energy_scale_RT * minima.multipliers[near],
+        np.array(links, dtype=np.int64),
+    )
+    return quick_of_minima(chain, ring, known)
 
 
 def _text(rows: list[list[str]]) -> bytes:
@@ -165,8 +190,7 @@ def state_path(output: Path) -> Path:
     return output.with_name(output.name + ".state.json")
 
 
-def scan_settings(source: SequenceSource, arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """What every row of a scan depends on: input, parameters and version."""
+def _settings(source: SequenceSource, arguments: Mapping[str, Any]) -> dict[str, Any]:
     plain = {
         key: value if isinstance(value, str | int | float | type(None)) else str(value)
         for key, value in arguments.items()
@@ -278,7 +302,9 @@ def scan(
     source : path or SequenceSource
         FASTA or GenBank, as :class:`dnacheck.io.sequences.SequenceSource` reads it.
     output : Path
-        CSV file with the columns :data:`COLUMNS`; J is Laplace's, summed over minima and links.
+        CSV file with the columns :data:`COLUMNS`; J is that of
+        :mod:`dnacheck.cyclization.laplace.quick`, and ``quality`` how far to believe it: good,
+        fair or poor, or :data:`QUALITY_LAPLACE`.
     progress : callable, optional
         Called with the number of records finished since the last call.
     restart : bool
@@ -296,7 +322,7 @@ def scan(
     if Path(source.name).resolve() == output.resolve():
         raise InputError(f"file '{output}' is the input; name another one for the output")
     arguments = dict(options.chain_arguments)
-    settings = scan_settings(source, arguments)
+    settings = _settings(source, arguments)
     angles = arguments.get("angles", "trifonov2")
     arguments["angles"] = load_parameters(angles) if isinstance(angles, str) else angles
     handle, resumed, failures = _opened(source, output, settings, restart)

@@ -44,7 +44,7 @@ _MOST_PER_SIDE = 24
 _CURVATURE_LIMIT = 6.0
 """Bound on the curvature of ln J in the mismatch, in its own standard deviations; a zero mode
 makes it infinite, and the window is far smaller than one standard deviation."""
-_EASY_RT = 3.0
+EASY_RT = 3.0
 """Energy of the lowest ring below which the free chain meets often enough by itself. Shapes of such
 long molecules are far from any minimum, and a mixture about minima would give heavy tails."""
 _WIDEST_TURN = 1.5
@@ -249,7 +249,7 @@ def centre_shapes(search: Equilibria) -> list[tuple[Array, Array, int]]:
 def closing_is_easy(search: Equilibria) -> bool:
     """Whether halves are drawn from the free chain, because closing it costs little."""
     energies = [ring.energy_RT for ring in search.equilibria if ring.stable is not False]
-    return min(energies, default=np.inf) < _EASY_RT
+    return min(energies, default=np.inf) < EASY_RT
 
 
 def window_shape(chain: Chain, spread: Array) -> Array:

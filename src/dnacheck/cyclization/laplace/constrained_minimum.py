@@ -110,6 +110,18 @@ def steps_in_RT(chain: Chain) -> HingeSteps:
     return HingeSteps(chain.arrays.ground, stiffness, chain.form_code)
 
 
+def slice_constant(chain: Chain, boundary: AnyBoundary = RING) -> float:
+    """ln J(psi) + E + ln det KKT / 2 - ln |S| of a register-constrained minimum, J in mol/L."""
+    scale = chain.energy_scale_RT
+    held = held_components(boundary)
+    return (
+        log_prefactor(chain, boundary)
+        - 0.5 * held * math.log(scale / (2.0 * math.pi))
+        + 1.5 * chain.n_free * math.log(scale)
+        - 0.5 * (held + 1) * math.log(2.0 * math.pi)
+    )
+
+
 class Constrainer:
     """Register-constrained minima of one molecule and link; keeps what every call needs.
 
@@ -138,14 +150,7 @@ class Constrainer:
         n = chain.n_steps
         self.along, self.across = np.empty((n, 3)), np.empty((n, 3))
         rk.register_functionals(chain.ground, chain.form_code, self.turns, self.along, self.across)
-        scale = chain.energy_scale_RT
-        held = held_components(boundary)
-        self.constant = (
-            log_prefactor(chain, boundary)
-            - 0.5 * held * math.log(scale / (2.0 * math.pi))
-            + 1.5 * chain.n_free * math.log(scale)
-            - 0.5 * (held + 1) * math.log(2.0 * math.pi)
-        )
+        self.constant = slice_constant(chain, boundary)
 
     def minimum(
         self, position: float, registers: int, angles: Array, multipliers: Array
@@ -169,6 +174,7 @@ class Constrainer:
             self.across,
             register,
             self.options.tolerance,
+            rk.CLOSED,
             self.options.max_iterations,
             self.boundary,
         )

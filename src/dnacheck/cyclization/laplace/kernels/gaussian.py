@@ -370,12 +370,24 @@ def draw_closed(rng: Any, factors: Any, normals: Any, out: Any) -> float:
     ``factors`` are :class:`SliceFactors`; ``normals`` (N, 3) is left with the standard normals
     that were drawn.
     """
-    quadratic = 0.0
     for s in range(normals.shape[0]):
         for k in range(3):
-            value = rng.standard_normal() if factors.root[s, 0] > 0.0 else 0.0
-            normals[s, k] = value
-            quadratic += value * value
+            normals[s, k] = rng.standard_normal() if factors.root[s, 0] > 0.0 else 0.0
+    return closed_of_normals(factors, normals, out)
+
+
+@njit(cache=True, nogil=True)
+def closed_of_normals(factors: Any, normals: Any, out: Any) -> float:
+    """The draw x (N, 3) that standard normals (N, 3) make; x^T H x returns.
+
+    Numbers of steps that a guest holds are not used.
+    """
+    quadratic = 0.0
+    for s in range(normals.shape[0]):
+        if not factors.root[s, 0] > 0.0:
+            continue
+        for k in range(3):
+            quadratic += normals[s, k] * normals[s, k]
     draw_slice(factors.right, factors.z, factors.root, normals, out)
     flat = out.reshape(out.size)
     open_by = np.empty(ROWS)

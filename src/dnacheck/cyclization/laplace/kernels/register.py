@@ -64,6 +64,8 @@ class RegisterProblem(NamedTuple):
         In radians.
     tolerance : float
         Largest entry of the gradient of the Lagrangian, RT per radian.
+    closed : float
+        Largest closure residual, steps and radians.
     most : int
         Iterations.
     boundary : Boundary
@@ -75,6 +77,7 @@ class RegisterProblem(NamedTuple):
     across: Any
     register: float
     tolerance: float
+    closed: float
     most: int
     boundary: Boundary
 
@@ -157,7 +160,7 @@ def constrained_minimum(
         figures[ITERATIONS] = iteration
         if not (math.isfinite(energy) and math.isfinite(worst) and math.isfinite(open_by)):
             return NOT_FINITE
-        done = worst <= problem.tolerance and open_by <= CLOSED
+        done = worst <= problem.tolerance and open_by <= problem.closed
         if not done and iteration == problem.most:
             return NOT_CONVERGED
         stiff_columns(rows, problem.inverse_stiffness, columns)
