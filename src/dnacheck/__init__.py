@@ -6,6 +6,7 @@
 
 chain             discrete chain of a molecule: name, letters or FASTA file
 rod               continuum rod of the same molecule
+bind              the chain with a protein's steps held
 rings             equilibria of a chain or a rod, lowest energy first
 jfactor           J factor, by the cheapest method that meets the tolerance
 diagram           bifurcation diagram against the end twist
@@ -52,6 +53,7 @@ if TYPE_CHECKING:
     from dnacheck.equilibria.boundary import NickedRing as NickedRing
     from dnacheck.equilibria.boundary import Pull as Pull
     from dnacheck.equilibria.boundary import Ring as Ring
+    from dnacheck.model.guests import bind as bind
     from dnacheck.numerics.outcome import InputError as InputError
     from dnacheck.numerics.outcome import SolveError as SolveError
 
@@ -61,6 +63,7 @@ __version__ = "0.1.0"
 _HOME = {
     "chain": "api.molecules",
     "rod": "api.molecules",
+    "bind": "model.guests",
     "rings": "api.equilibria",
     "jfactor": "api.cyclization",
     "diagram": "api.equilibria",

@@ -6,6 +6,7 @@ import os
 import click
 import pytest
 
+import dnacheck as dc
 from dnacheck.commands.common import (
     ContinuumSettings,
     ModelSettings,
@@ -68,9 +69,14 @@ def test_every_option_arrives():
     assert os.environ["OMP_NUM_THREADS"] == "3"
 
 
-def test_model_settings_name_the_arguments_of_build_chain():
-    accepted = inspect.signature(build_chain).parameters
-    assert set(parse()["model"].chain_arguments()) <= set(accepted)
+def test_settings_name_the_arguments_of_what_they_are_for():
+    settings = parse()
+    for arguments, function in (
+        (settings["model"].chain_arguments(), dc.chain),
+        (settings["model"].build_arguments(), build_chain),
+        (settings["continuum"].rod_arguments(), dc.rod),
+    ):
+        assert set(arguments) <= set(inspect.signature(function).parameters)
 
 
 @pytest.mark.parametrize("link", ["auto", "all"])

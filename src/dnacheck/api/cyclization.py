@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+import time
 from typing import Any
 
 from dnacheck.api.arguments import Progress, positive, thread_count, told
-from dnacheck.api.equilibria import link_choice
+from dnacheck.api.equilibria import boundary_of, checked_link
 from dnacheck.api.molecules import Target, as_chain
 from dnacheck.cyclization.method import Method
 from dnacheck.cyclization.methods import METHODS, Auto, method_named
 from dnacheck.cyclization.result import JFactor
+from dnacheck.equilibria.boundary import AnyBoundary
 from dnacheck.equilibria.ring import Equilibria
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import InputError
@@ -38,6 +40,7 @@ def jfactor(
     method: Method | str | None = None,
     *,
     link: str | int | None = None,
+    ends: str | AnyBoundary | None = None,
     tolerance: float = 0.02,
     max_seconds: float = math.inf,
     rng: Randomness = 0,
@@ -53,10 +56,12 @@ def jfactor(
         By default the cheapest whose measured error meets the tolerance.
     link : "auto", "all" or int, optional
         Links to search; an integer asks for the part of J at that link.
+    ends : Ring, NickedRing, HingedRing, Loop, or the name of one of the first three
+        What the end has to meet: place and orientation, place and axis, place alone, or a pose.
     tolerance : float
         Error of ln J that is asked for; the result's ``status`` says whether it was met.
     max_seconds : float
-        Wall time after which the best so far is returned.
+        Wall time, the search for rings included, after which the best so far is returned.
     rng : int, SeedSequence or Generator
     threads : int, optional
         By default every processor; no result depends on it.
@@ -73,7 +78,7 @@ def jfactor(
     InputError
         One line that names the argument and the mend.
     SolveError
-        No ring at the links asked for, or no draw could be used.
+        No equilibrium at the links asked for, or no draw could be used.
 
     Examples
     --------
@@ -82,18 +87,21 @@ def jfactor(
     >>> j.links[0].link, j.stderr, 10.0 < j.minus_lnJ < 25.0
     (15, 0.0, True)
     """
-    from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
+    from dnacheck.equilibria.discrete.boundary_search import find_equilibria
+    from dnacheck.equilibria.discrete.search import SearchOptions
 
     way = method_of(method)
     tolerance = positive("tolerance", tolerance)
     if max_seconds != math.inf:
         positive("max_seconds", max_seconds)
     count = thread_count(threads)
-    links: Any = link_choice(link)
-    if isinstance(source, Equilibria):
-        search = source
+    began = time.perf_counter()
+    body = source if isinstance(source, Equilibria) else as_chain(source)
+    links = checked_link(link, body.chain.n_steps if isinstance(body, Equilibria) else body.n_steps)
+    if isinstance(body, Equilibria):
+        search = body
     else:
-        search = find_rings(as_chain(source), SearchOptions(links=links))
+        search = find_equilibria(body, boundary_of(ends), SearchOptions(links=links))
     if isinstance(links, int):
         # Raises where the link has no ring: no other's J may stand for it.
         _ = search.lowest
@@ -111,6 +119,6 @@ def jfactor(
             threads=count,
             progress=total,
             tolerance=tolerance,
-            max_seconds=max_seconds,
+            max_seconds=max(max_seconds - (time.perf_counter() - began), 1e-3),
         )
     return result.of_link(links, tolerance) if isinstance(links, int) else result

@@ -4,19 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
 from dnacheck.api.arguments import one_of, whole
 from dnacheck.api.molecules import Target, as_chain
 from dnacheck.equilibria.boundary import ENDS, AnyBoundary, Ring
-from dnacheck.equilibria.continuation.component import Component
-from dnacheck.equilibria.continuation.twist_ratio import RatioSweep
 from dnacheck.equilibria.ring import Equilibria
 from dnacheck.model.chain import Chain
 from dnacheck.model.rod import Rod
 from dnacheck.numerics.outcome import InputError, SolveError
+
+if TYPE_CHECKING:
+    from dnacheck.equilibria.continuation.component import Component
+    from dnacheck.equilibria.continuation.twist_ratio import RatioSweep
+
+
+def checked_link(link: Any, n_bp: int) -> Any:
+    """As :func:`link_choice`, within what so many base pairs can have."""
+    from dnacheck.model.ranges import check_link
+
+    chosen: Any = link_choice(link)
+    check_link(chosen, n_bp)
+    return chosen
 
 
 def link_choice(link: Any) -> str | int:
@@ -84,8 +95,10 @@ def rings(
     >>> ring.coordinates_A.shape, ring.angles_deg.shape
     ((159, 3), (158, 3))
     """
-    links: Any = link_choice(link)
     boundary = boundary_of(ends)
+    if not isinstance(source, Rod):
+        source = as_chain(source)
+    links = checked_link(link, source.n_steps)
     if isinstance(source, Rod):
         from dnacheck.equilibria.continuum import lowest_continuum_ring
 
@@ -98,7 +111,7 @@ def rings(
         from dnacheck.equilibria.discrete.boundary_search import find_equilibria
         from dnacheck.equilibria.discrete.search import SearchOptions
 
-        found = find_equilibria(as_chain(source), boundary, SearchOptions(links=links))
+        found = find_equilibria(source, boundary, SearchOptions(links=links))
     if throw and not found.minima:
         raise SolveError(f"{found.model} {boundary.label} of {found.name}: {found.reason}", found)
     return found
@@ -175,7 +188,10 @@ def _pair(name: str, value: Any) -> tuple[float, float]:
 
 
 def twist_ratio_scan(
-    source: Chain | Rod | Target, ratios: ArrayLike | Sequence[float], *, corrected: bool = False
+    source: Chain | Rod | Target,
+    ratios: ArrayLike | Sequence[float],
+    *,
+    corrected_for: Chain | None = None,
 ) -> RatioSweep:
     """Ring energies with bending and twisting parts over twisting / bending stiffness.
 
@@ -185,8 +201,9 @@ def twist_ratio_scan(
         A chain with the uniform stiffness; its own ratio is not used.
     ratios : sequence of float, shape (R,)
         Increasing, greater than 0.
-    corrected : bool
-        For a chain: the continuum energies of its rod, with the steps' own compliance.
+    corrected_for : Chain, optional
+        Of a rod: the chain that it was made from, whose steps' own compliance corrects its
+        energies.
 
     Returns
     -------
@@ -214,12 +231,7 @@ def twist_ratio_scan(
 
     values = check_ratios(ratios)
     if isinstance(source, Rod):
-        if corrected:
-            raise InputError("corrected: the steps' compliance is the chain's; give the chain")
-        return sweep_continuum(source, values)
-    body = as_chain(source)
-    if corrected:
-        from dnacheck.api.molecules import rod
-
-        return sweep_continuum(rod(body), values, corrected_for=body)
-    return sweep_discrete(body, values)
+        return sweep_continuum(source, values, corrected_for=corrected_for)
+    if corrected_for is not None:
+        raise InputError("corrected_for: only a rod's energies are corrected; give rod(chain)")
+    return sweep_discrete(as_chain(source), values)

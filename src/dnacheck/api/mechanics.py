@@ -18,7 +18,7 @@ from dnacheck.numerics.outcome import InputError
 from dnacheck.numerics.seeds import Randomness, seed_sequence
 
 if TYPE_CHECKING:
-    from dnacheck.mechanics.fit import MechanicsFit
+    from dnacheck.mechanics.fit import MechanicsFit, Prior
     from dnacheck.mechanics.profile import LengthProfile
     from dnacheck.mechanics.sensitivity import Sensitivity
 
@@ -161,7 +161,7 @@ def fit(
     data: str | os.PathLike[str] | Sequence[Any],
     free: Sequence[str] = ("persistence_length_A", "twist_ratio", "twist_offset_deg", "bend_scale"),
     *,
-    priors: Mapping[str, tuple[float, float]] | None = None,
+    priors: Mapping[str, Prior | tuple[float, float]] | None = None,
     robust: bool = False,
     tolerance: float = 0.02,
     rng: int = 0,
@@ -177,7 +177,7 @@ def fit(
         CSV with the columns molecule, minus_lnJ (or J_molar), stderr, optionally group and name.
     free : sequence of str
         Parameters to fit; also offset, offset[GROUP], tau[AA] ...
-    priors : mapping of str to (mean, standard error), optional
+    priors : mapping of str to (mean, standard error) or Prior, optional
         Normal priors.
     robust : bool
         Huber's loss, which forgives outliers.
@@ -209,7 +209,7 @@ def fit(
     >>> found = dc.fit("measured.csv", ["persistence_length_A"])  # doctest: +SKIP
     >>> found.to_frame()  # doctest: +SKIP
     """
-    from dnacheck.mechanics.fit import FitOptions, Prior, fit_mechanics
+    from dnacheck.mechanics.fit import FitOptions, fit_mechanics
     from dnacheck.mechanics.measurements import read_measurements
 
     read = isinstance(data, (str, os.PathLike))
@@ -228,7 +228,21 @@ def fit(
             measurements,
             [chain(item.molecule, **parameters) for item in measurements],
             list(free),
-            {name: Prior(*pair) for name, pair in (priors or {}).items()},
+            {name: _prior(name, item) for name, item in (priors or {}).items()},
             options,
             step,
         )
+
+
+def _prior(name: str, value: Any) -> Prior:
+    from dnacheck.mechanics.fit import Prior
+
+    if isinstance(value, Prior):
+        return value
+    try:
+        mean, error = (float(x) for x in value)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"priors: '{name}' needs a mean and a standard error, not {value!r}"
+        ) from None
+    return Prior(mean, error)

@@ -15,7 +15,7 @@ import functools
 import importlib
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal, TypeVar
 
 import click
@@ -61,14 +61,19 @@ class ModelSettings:
     """Steps with the A-tract twist: by a rule, none, or first and last (0-based, included)."""
 
     def chain_arguments(self) -> dict[str, Any]:
-        """Keyword arguments of :func:`dnacheck.model.chain.build_chain`."""
+        """Keyword arguments of :func:`dnacheck.chain`."""
         return {
-            "angles": self.angles,
+            "parameters": self.angles,
             "twist_ratio": self.twist_ratio,
             "persistence_length_A": self.persistence_length,
             "rise_A": self.rise,
             "a_tracts": self.a_tracts if isinstance(self.a_tracts, str) else (self.a_tracts,),
         }
+
+    def build_arguments(self) -> dict[str, Any]:
+        """Keyword arguments of :func:`dnacheck.model.chain.build_chain`."""
+        arguments = self.chain_arguments()
+        return {"angles": arguments.pop("parameters"), **arguments}
 
 
 @dataclass(frozen=True)
@@ -91,6 +96,10 @@ class ContinuumSettings:
     """Spline pieces, k."""
     degree: int
     """Of the polynomials, m."""
+
+    def rod_arguments(self) -> dict[str, int]:
+        """Keyword arguments of :func:`dnacheck.rod`."""
+        return asdict(self)
 
 
 def limit_library_threads(threads: int) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+import dnacheck as dc
 from dnacheck.commands import option_types as allowed
 from dnacheck.commands.common import (
     ContinuumSettings,
@@ -124,8 +125,7 @@ def _components(
     from dnacheck.equilibria.continuation.options import ContinuationOptions
     from dnacheck.equilibria.continuation.parameters import perfect_rod
     from dnacheck.io.sequences import read_one
-    from dnacheck.model.chain import PERSISTENCE_LENGTH_A, RISE_A, TWIST_RATIO, build_chain
-    from dnacheck.model.rod import RodOptions, build_rod
+    from dnacheck.model.chain import PERSISTENCE_LENGTH_A, RISE_A, TWIST_RATIO
     from dnacheck.numerics.outcome import InputError
 
     turn = 2.0 * math.pi
@@ -144,21 +144,12 @@ def _components(
         if search:
             raise InputError("the perfect diagram is connected: leave out --components")
         return (diagram.perfect_diagram(rod, 0.5 if alpha is None else alpha, limits, options),)
-    chain = build_chain(read_one(target, "a diagram"), **model.chain_arguments())
-    rod = build_rod(
-        chain,
-        RodOptions(
-            filter_width=continuum.filter_width,
-            intervals=continuum.intervals,
-            degree=continuum.degree,
-        ),
-    )
-    options = ContinuationOptions(max_points=max_points)
+    chain = dc.chain(read_one(target, "a diagram"), **model.chain_arguments())
+    rod = dc.rod(chain, **continuum.rod_arguments())
     if search:
+        options = ContinuationOptions(max_points=max_points)
         return diagram.components(rod, None, limits or Bounds(-5 * math.pi, 5 * math.pi), options)
-    if alpha is not None:
-        return (diagram.imperfect_component(rod, alpha, bounds=limits, options=options),)
-    return (diagram.lowest_component(rod, limits, options),)
+    return (dc.diagram(rod, bounds=bounds, start=start, max_points=max_points),)
 
 
 def _failed(target: str, error: Exception, run: RunSettings) -> int:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+import dnacheck as dc
 from dnacheck.commands import option_types as allowed
 from dnacheck.commands.common import (
     ModelSettings,
@@ -73,23 +74,21 @@ def command(
     the data cannot see, how well each molecule is predicted when it is left out, and whether the
     model explains the data within their errors.
     """
-    from dnacheck.mechanics.fit import FitOptions, fit_mechanics
-    from dnacheck.mechanics.measurements import read_measurements
     from dnacheck.mechanics.posterior import posterior as sample_posterior
     from dnacheck.mechanics.posterior import profile_likelihood
-    from dnacheck.model.chain import build_chain
 
-    measurements = read_measurements(data)
-    chains = [build_chain(item.molecule, **model.chain_arguments()) for item in measurements]
     names = [name.strip() for name in free.split(",") if name.strip()]
     with progress("iterations", None, run.quiet or run.json) as advance:
-        fit = fit_mechanics(
-            measurements,
-            chains,
+        fit = dc.fit(
+            data,
             names,
-            dict(_prior(text) for text in prior_texts),
-            FitOptions(tolerance=tolerance, robust=robust, seed=run.seed, threads=run.threads),
-            lambda number, rms: advance(1),
+            priors=dict(_prior(text) for text in prior_texts),
+            robust=robust,
+            tolerance=tolerance,
+            rng=run.seed,
+            threads=run.threads,
+            progress=advance,
+            **model.chain_arguments(),
         )
     record = fit.to_dict()
     for item in record["parameters"]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import click
 
+import dnacheck as dc
 from dnacheck.commands import option_types as allowed
 from dnacheck.commands.binding import with_guests
 from dnacheck.commands.common import (
@@ -79,11 +79,7 @@ def command(
     -ln J is the free energy of cyclization over RT. With nicked ends J is the density of closure in
     place and axis, with hinged ends in place alone.
     """
-    from dnacheck.equilibria.boundary import ENDS
-    from dnacheck.equilibria.discrete.boundary_search import find_equilibria
-    from dnacheck.equilibria.discrete.search import SearchOptions
     from dnacheck.io.sequences import read_target
-    from dnacheck.model.chain import build_chain
     from dnacheck.model.ranges import check_link
     from dnacheck.numerics.outcome import InputError, SolveError, TimeLimitReachedError
 
@@ -100,34 +96,29 @@ def command(
             refused = True
             continue
         began = time.perf_counter()
-        chain = with_guests(build_chain(molecule, **model.chain_arguments()), bind)
+        chain = with_guests(dc.chain(molecule, **model.chain_arguments()), bind)
         check_link(link, chain.n_steps)
 
         def compute(left: float, chain: Chain = chain) -> tuple[JFactor, Binding | None]:
             searching = time.perf_counter()
-            search = find_equilibria(chain, ENDS[ends], SearchOptions(links=link))
-            if isinstance(link, int):
-                # Raises where the link has no ring: no other's J may stand for it.
-                _ = search.lowest
             with progress(f"{chain.name}: draws", None, run.quiet or run.json) as advance:
-                result = way.compute(
-                    search,
+                result = dc.jfactor(
+                    chain,
+                    way,
+                    link=link,
+                    ends=ends,
                     rng=run.seed,
                     threads=run.threads,
-                    progress=_by_difference(advance),
+                    progress=advance,
                     tolerance=tolerance,
                     # A bound molecule leaves half of the time to the free one.
-                    max_seconds=max(
-                        left * (0.5 if chain.guests else 1.0) - (time.perf_counter() - searching),
-                        1e-3,
-                    ),
+                    max_seconds=left * (0.5 if chain.guests else 1.0),
                 )
-            if isinstance(link, int):
-                result = result.of_link(link, tolerance)
             if not chain.guests:
                 return result, None
             from dnacheck.cyclization.binding import binding
             from dnacheck.cyclization.method import Run
+            from dnacheck.equilibria.discrete.search import SearchOptions
 
             rest = max(left - (time.perf_counter() - searching), 1e-3)
             asked = Run(run.seed, run.threads, None, tolerance, rest)
@@ -174,18 +165,6 @@ def _failure(name: str, n_bp: int, method: str, error: Exception, began: float) 
         "seconds": time.perf_counter() - began,
         "warnings": [" ".join(str(error).split())],
     }
-
-
-def _by_difference(advance: Callable[[int], None]) -> Callable[[int], None]:
-    """A bar that moves by differences, told the total."""
-    made = 0
-
-    def drawn(total: int) -> None:
-        nonlocal made
-        advance(total - made)
-        made = total
-
-    return drawn
 
 
 def _print_binding(linkage: Binding) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+import dnacheck as dc
 from dnacheck.commands import option_types as allowed
 from dnacheck.commands.common import (
     ModelSettings,
@@ -152,10 +153,9 @@ def command(
     from a bead trajectory of TARGET instead.
     """
     from dnacheck.io.sequences import read_one
-    from dnacheck.model.chain import build_chain
     from dnacheck.numerics.outcome import InputError
 
-    chain = build_chain(read_one(target, "a bead-chain check"), **model.chain_arguments())
+    chain = dc.chain(read_one(target, "a bead-chain check"), **model.chain_arguments())
     for warning in chain.warnings:
         note(f"{chain.name}: {warning}", run.quiet)
     if trajectory is not None:
@@ -192,12 +192,11 @@ def _check(
     import numpy as np
 
     from dnacheck.commands.md_output import print_check, record_of, write_files
-    from dnacheck.equilibria.discrete.search import find_rings
     from dnacheck.md.check import run_md_check
 
     begin = time.perf_counter()
-    search = find_rings(chain)
-    minima = [ring for ring in search.equilibria if ring.stable]
+    search = dc.rings(chain, throw=False)
+    minima = [ring for ring in search if ring.stable]
     angles = np.stack([ring.angles for ring in minima]) if minima else None
     nearest = int(np.floor(chain.relaxed_turns))
     links = {nearest, nearest + 1} | {ring.link for ring in minima}

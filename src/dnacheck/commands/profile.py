@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+import dnacheck as dc
 from dnacheck.commands import option_types as allowed
 from dnacheck.commands.common import (
     ModelSettings,
@@ -18,7 +19,7 @@ from dnacheck.commands.common import (
 )
 from dnacheck.commands.option_types import Count, Number, integer, shown
 from dnacheck.commands.output import note, print_json, progress
-from dnacheck.cyclization.methods import METHODS, method_named
+from dnacheck.cyclization.methods import METHODS
 
 if TYPE_CHECKING:
     from dnacheck.mechanics.profile import LengthProfile
@@ -118,31 +119,28 @@ def command(
     FASTA file with several records gives several profiles, drawn in one picture.
     """
     from dnacheck.io.sequences import read_target
-    from dnacheck.mechanics.profile import length_profile, read_measured_profile
-    from dnacheck.model.chain import build_chain
+    from dnacheck.mechanics.profile import read_measured_profile
     from dnacheck.numerics.outcome import InputError
 
     molecules = list(read_target(target))
     points = () if measured is None else read_measured_profile(measured)
-    way = method_named(method)
     profiles: list[LengthProfile] = []
     with progress("lengths", len(change) * len(molecules), run.quiet or run.json) as advance:
         for molecule in molecules:
             if isinstance(molecule, InputError):
                 raise molecule
             profiles.append(
-                length_profile(
+                dc.profile(
                     molecule,
                     change,
-                    lambda item: way.compute(
-                        build_chain(item, **model.chain_arguments()),
-                        rng=run.seed,
-                        tolerance=tolerance,
-                    ),
                     place=place,
                     filler=filler,
+                    method=method,
+                    tolerance=tolerance,
+                    rng=run.seed,
                     threads=run.threads,
                     progress=advance,
+                    **model.chain_arguments(),
                 )
             )
     records = [profile.to_dict() for profile in profiles]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+import dnacheck as dc
 from dnacheck.commands.binding import with_guests
 from dnacheck.commands.common import (
     ContinuumSettings,
@@ -111,10 +112,9 @@ def _solve(
     bind: tuple[str, ...],
 ) -> tuple[dict[str, Any], bool, Found]:
     """The JSON record of one molecule, whether every model asked for converged, and its rings."""
-    from dnacheck.model.chain import build_chain
     from dnacheck.model.ranges import check_link
 
-    chain = with_guests(build_chain(molecule, **model.chain_arguments()), bind)
+    chain = with_guests(dc.chain(molecule, **model.chain_arguments()), bind)
     check_link(ring.link, chain.n_steps)
     if structure is not None:
         from dnacheck.io.structure import structure_file
@@ -198,11 +198,7 @@ def _discrete_only(ring: RingSettings, warnings: list[str]) -> RingSettings:
 def _discrete(
     chain: Chain, ring: RingSettings, warnings: list[str]
 ) -> tuple[Equilibrium | None, list[dict[str, Any]]]:
-    from dnacheck.equilibria.boundary import ENDS
-    from dnacheck.equilibria.discrete.boundary_search import find_equilibria
-    from dnacheck.equilibria.discrete.search import SearchOptions
-
-    found = find_equilibria(chain, ENDS[ring.ends], SearchOptions(links=ring.link))
+    found = dc.rings(chain, ring.link, ring.ends, throw=False)
     if found.failed_starts:
         warnings.append(
             f"discrete: {found.failed_starts} of {found.starts} starts did not converge; "
@@ -234,19 +230,9 @@ def _discrete(
 def _continuum(
     chain: Chain, ring: RingSettings, continuum: ContinuumSettings, warnings: list[str]
 ) -> tuple[Equilibrium | None, list[dict[str, Any]]]:
-    from dnacheck.equilibria.continuum import lowest_continuum_ring
-    from dnacheck.model.rod import RodOptions, build_rod
-
-    rod = build_rod(
-        chain,
-        RodOptions(
-            filter_width=continuum.filter_width,
-            intervals=continuum.intervals,
-            degree=continuum.degree,
-        ),
-    )
+    rod = dc.rod(chain, **continuum.rod_arguments())
     warnings += [f"continuum: {text}" for text in rod.warnings]
-    found = lowest_continuum_ring(rod, ring.link)
+    found = dc.rings(rod, ring.link, throw=False)
     warnings += [f"continuum: {text}" for text in found.notes]
     entries = [item.to_dict() for item in found]
     if not found.minima:

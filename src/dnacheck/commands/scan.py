@@ -43,7 +43,7 @@ def command(
     from dnacheck.scanning.scan import ScanOptions, scan, state_path, summary_line
 
     source = SequenceSource(fasta)
-    options = ScanOptions(model.chain_arguments(), run.threads)
+    options = ScanOptions(model.build_arguments(), run.threads)
     with progress("sequences", source.count, run.quiet or run.json) as advance:
         summary = scan(source, output, options, advance, restart)
     if run.json:

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+import dnacheck as dc
 from dnacheck.commands import option_types as allowed
 from dnacheck.commands.common import (
     ModelSettings,
@@ -65,27 +66,17 @@ def command(
     for those that matter most.
     """
     from dnacheck.io.sequences import read_one
-    from dnacheck.mechanics.sensitivity import sensitivity_of
-    from dnacheck.model.chain import build_chain
-    from dnacheck.model.molecules import Molecule
-    from dnacheck.model.sequence import parse_sequence
 
     molecule = read_one(target, "a sensitivity map")
-    arguments = model.chain_arguments()
-    regions = molecule.a_tract_regions
-
-    def rebuild(letters: str) -> Any:
-        return build_chain(Molecule(parse_sequence(letters, molecule.name), regions), **arguments)
-
     with progress("substitutions", compute, run.quiet or run.json) as advance:
-        found = sensitivity_of(
-            build_chain(molecule, **arguments),
-            rebuild,
+        found = dc.sensitivity(
+            molecule,
             tolerance=tolerance,
             compute=compute,
             rng=run.seed,
             threads=run.threads,
             progress=advance,
+            **model.chain_arguments(),
         )
     record = found.to_dict()
     if run.json:

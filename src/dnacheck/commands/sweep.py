@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+import dnacheck as dc
 from dnacheck.commands.common import (
     ContinuumSettings,
     ModelSettings,
@@ -102,35 +103,28 @@ def command(
     Every minimum found is followed, and the search is repeated at some of the ratios, so that the
     energies are those of the lowest ring at each; the twist ratio of the model is not used.
     """
-    from dnacheck.equilibria.continuation.figures import sweep_data
-    from dnacheck.equilibria.continuation.twist_ratio import sweep_continuum, sweep_discrete
     from dnacheck.io.sequences import read_target
-    from dnacheck.model.chain import build_chain
-    from dnacheck.model.rod import RodOptions, build_rod
     from dnacheck.numerics.outcome import InputError
 
     molecules = list(read_target(target))
     models = ("continuum", "discrete") if which == "both" else (which,)
-    rod_options = RodOptions(
-        filter_width=continuum.filter_width,
-        intervals=continuum.intervals,
-        degree=continuum.degree,
-    )
     records: list[dict[str, Any]] = []
     complete = True
     with progress("sweeps", len(molecules) * len(models), run.quiet) as advance:
         for molecule in molecules:
             if isinstance(molecule, InputError):
                 raise molecule
-            chain = build_chain(molecule, **model.chain_arguments())
+            chain = dc.chain(molecule, **model.chain_arguments())
             for kind in models:
                 if kind == "continuum":
-                    rod = build_rod(chain, rod_options)
-                    sweep = sweep_continuum(rod, ratios, corrected_for=chain if corrected else None)
+                    rod = dc.rod(chain, **continuum.rod_arguments())
+                    sweep = dc.twist_ratio_scan(
+                        rod, ratios, corrected_for=chain if corrected else None
+                    )
                 else:
-                    sweep = sweep_discrete(chain, ratios)
+                    sweep = dc.twist_ratio_scan(chain, ratios)
                 complete = complete and not sweep.missing.size
-                records.append({**sweep_data(sweep), "n_bp": chain.n_steps})
+                records.append({**sweep.to_dict(), "n_bp": chain.n_steps})
                 advance(1)
     if plot is not None:
         _draw(plot, records)

@@ -79,6 +79,13 @@ def bind(chain: Chain, site: int, steps: GuestSteps | str | Path | ArrayLike) ->
     InputError
         A site outside the chain, a step held twice, a file that cannot be read, or too few
         elastic steps left.
+
+    Examples
+    --------
+    >>> import dnacheck as dc
+    >>> bound = dc.bind(dc.chain("11T15"), 60, "cap")
+    >>> [guest.name for guest in bound.guests], bound.n_free < bound.n_steps
+    (['cap'], True)
     """
     guest = guest_steps(steps)
     n = chain.n_steps
