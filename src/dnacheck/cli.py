@@ -34,6 +34,7 @@ COMMAND_HELP = {
     "sweep": "Ring energies over a range of twist ratios.",
     "diagram": "Bifurcation diagram: energy and end moment against end twist.",
     "jfactor": "Cyclization probability (J factor) of a molecule.",
+    "loop": "A loop between two sites held in a pose: energies and J.",
     "profile": "J factor against length.",
     "sensitivity": "What each step and each letter does to ln J.",
     "fit": "Mechanics from measured J factors.",

@@ -2,8 +2,9 @@
 
 A nicked ring starts from planar circles without excess twist, in the registers where the planar
 ring is predicted to rest. A hinged ring starts from the nicked ones, released, and from circles
-rolled by quarter turns. A loop starts from the unstressed shape and from the rings, whose end is
-led to the target's pose in as many steps as it needs. A pulled chain starts from its unstressed
+rolled by quarter turns. A loop starts from the unstressed shape, as it is and turned
+evenly until its end faces as the target, and from the rings; the end is led to the target's pose in
+as many steps as it needs. A pulled chain starts from its unstressed
 shape.
 """
 
@@ -22,7 +23,7 @@ from dnacheck.equilibria.discrete.kernels.search import fill_start, predicted_re
 from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
 from dnacheck.equilibria.discrete.solve import NewtonOptions, solve_ring
 from dnacheck.equilibria.ring import RING, Equilibria, Equilibrium
-from dnacheck.model.chain import Chain, chain_frames
+from dnacheck.model.chain import Chain, angles_of_frames, chain_frames, rigid_coordinates
 from dnacheck.numerics.outcome import InputError, Status
 
 Array = NDArray[np.float64]
@@ -140,9 +141,33 @@ def _loops(
 ) -> Iterator[Equilibrium | None]:
     centres, frames = chain_frames(chain.ground, chain.step_form)
     yield _approach(chain, chain.ground, centres[-1], frames[-1], boundary, newton)
+    for turned in _evenly_turned(chain, np.array(boundary.rotation)):
+        there, facing = chain_frames(turned, chain.step_form)
+        yield _approach(chain, turned, there[-1], facing[-1], boundary, newton)
     search = find_rings(chain, SearchOptions("all" if everything else "auto", newton))
     for ring in search.equilibria:
         yield _approach(chain, ring.angles, np.zeros(3), np.eye(3), boundary, newton)
+
+
+def _evenly_turned(chain: Chain, target: Array) -> Iterator[Array]:
+    """The unstressed shape bent and twisted evenly until its end faces as the target, both ways."""
+    from scipy.spatial.transform import Rotation
+
+    centres, frames = chain_frames(chain.ground, chain.step_form)
+    turn = Rotation.from_matrix(target @ frames[-1].T).as_rotvec()
+    angle = float(np.linalg.norm(turn))
+    ways = [turn]
+    if angle > 1e-6:
+        ways.append(turn * (1.0 - 2.0 * math.pi / angle))
+    along = np.arange(chain.n_steps + 1)[:, None] / chain.n_steps
+    for way in ways:
+        rotations = Rotation.from_rotvec(along * way).as_matrix()
+        bent = np.ascontiguousarray(rotations @ frames)
+        if chain.rigid:
+            steps = np.einsum("sij,sj->si", rotations[:-1], np.diff(centres, axis=0))
+            yield rigid_coordinates(np.concatenate([centres[:1], np.cumsum(steps, axis=0)]), bent)
+        else:
+            yield angles_of_frames(bent, chain.step_form)
 
 
 def _approach(
