@@ -8,15 +8,17 @@ import re
 from pathlib import Path
 from typing import Any
 
-import dnacheck
-
 LAYERS = {
     "numerics": "Numerics",
     "model": "Model",
-    "ring": "Rings",
-    "jfactor": "J factors",
+    "io": "Files",
+    "equilibria": "Equilibria",
+    "cyclization": "J factors",
     "md": "Bead chain",
-    "validate": "Validation",
+    "mechanics": "Mechanics",
+    "scanning": "Many sequences",
+    "validation": "Validation",
+    "api": "Behind the public names",
     "commands": "Command line",
 }
 """Packages in the order of the imports, lowest first."""
@@ -37,8 +39,6 @@ def write_pages(app: Any) -> None:
     folder = Path(app.srcdir) / "reference" / "generated"
     folder.mkdir(parents=True, exist_ok=True)
     for layer, title in LAYERS.items():
-        if not (Path(dnacheck.__file__).parent / layer).is_dir():
-            continue
         lines = [f"# {title}: `dnacheck.{layer}`", ""]
         for name in modules(layer):
             lines += [

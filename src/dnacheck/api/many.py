@@ -26,7 +26,8 @@ class Scan:
     Attributes
     ----------
     table : pandas.DataFrame
-        name, n_bp, link, energy_RT, energy_reduced, minus_lnJ, status, quality; in the order of the input.
+        name, n_bp, link, energy_RT, energy_reduced, minus_lnJ, status, quality; in the order of
+        the input.
     rows, ok_rows : int
         All rows, and those whose status is ``ok``.
     seconds : float

@@ -141,11 +141,9 @@ def _solve(
         converged = converged and discrete is not None
     comparison = None
     if smooth is not None and discrete is not None:
-        from dnacheck.equilibria.bridge.reconstruct import rms_difference
-
         comparison = {
             "energy_difference_percent": 100.0 * (smooth.energy / discrete.energy - 1.0),
-            "rms_A": rms_difference(smooth.centres, discrete.centres, chain.rise_A),
+            "rms_A": smooth.rms_difference_A(discrete),
         }
     record = {
         "target": molecule.name,

@@ -366,6 +366,18 @@ class Equilibrium:
         scale = self.source.energy_scale_RT * thermal_energy_pN_nm(self.temperature_K)
         return _frozen(self._loads[1] * scale)
 
+    def rms_difference_A(self, other: Equilibrium) -> float:
+        """Rms distance in Å between the base-pair centres of two rings after superposition.
+
+        Raises
+        ------
+        InputError
+            The two have different numbers of base pairs.
+        """
+        from dnacheck.equilibria.bridge.reconstruct import rms_difference
+
+        return rms_difference(self.centres, other.centres, self.source.rise_A)
+
     def to_dict(self) -> dict[str, Any]:
         """What the commands print as JSON.
 
