@@ -26,6 +26,7 @@ GROUP_MODULES = (
     "continuum",
     "sweeps",
     "jfactors",
+    "bound",
     "bead_chain",
     "speed",
     "hard",

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from dnacheck.validation.plots import bead_chain, continuation, curves, rod, shapes
+from dnacheck.validation.plots import bead_chain, binding, continuation, curves, rod, shapes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,6 +36,7 @@ KINDS: dict[str, tuple[Panel, ...]] = {
     "drift": (curves.drift,),
     "work_precision": (curves.work_precision,),
     "named_lines": (curves.named_lines,),
+    "binding": (binding.free_to_bound,),
     "fluctuation": (bead_chain.fluctuation,),
     "bead_ring": (bead_chain.ring_from_above, bead_chain.ring_from_the_side),
     "sweep_energy": (_sweep("energy"),),

@@ -204,8 +204,39 @@ class _Reader:
                         f"no group of checks is called '{name}'; {mend}", "checks", "groups", index
                     )
 
+    def guests(self, scene: Scene) -> None:
+        """Refuse a guest that cannot be read or finds no site in a molecule."""
+        from dnacheck.model.guests import guest_steps
+
+        if scene.wanted.binding is None:
+            if "guest" in scene.model_fields_set:
+                raise self.fail(
+                    "a guest but no wish for it; add binding = 0.05 to [wanted]", "guest"
+                )
+            return
+        if scene.wanted.binding < FINEST_LN_J:
+            raise self.fail(
+                f"an error of {scene.wanted.binding:g} on ln of a ratio needs more sampling than a "
+                f"report can wait for; ask for {FINEST_LN_J:g} or more",
+                "wanted",
+                "binding",
+            )
+        try:
+            guest_steps(scene.guest.steps)
+        except InputError as error:
+            raise self.fail(str(error), "guest", "steps") from None
+        for name, letters, _ in scene.resolved:
+            if scene.guest.site_in(letters) is None:
+                raise self.fail(
+                    f"molecule '{name}' has no site {scene.guest.at!r}; give [guest] at the number "
+                    "of a step or letters that all molecules have",
+                    "guest",
+                    "at",
+                )
+
     def wishes(self, scene: Scene) -> None:
         """Refuse wishes that these molecules can't fulfil."""
+        self.guests(scene)
         names = {name for name, _, _ in scene.resolved}
         strange = names - set(embedded_names())
         if scene.checks.against_paper and strange:

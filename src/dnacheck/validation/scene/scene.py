@@ -86,6 +86,24 @@ class Wanted(_Part):
     shape_A: Positive | None = None
     ln_J: Positive | None = None
     thermal_energy: Positive | None = None
+    binding: Positive | None = None
+    """Absolute error of ln of the ratio of binding constants, ring over linear; see Guest."""
+
+
+class Guest(_Part):
+    """What is bound where, for the quantity ``binding``."""
+
+    steps: str = Field(default="cap", min_length=1)
+    """Bundled guest, or a kink such as roll=40@-5,5."""
+    at: str | int = "GTGAGCTAACTCAC"
+    """Step that is the guest's step 0; or letters of its site, of which that is the middle step."""
+
+    def site_in(self, letters: str) -> int | None:
+        """Step of a molecule that is the guest's step 0; None if it has no such site."""
+        if isinstance(self.at, int):
+            return self.at if 0 <= self.at < len(letters) else None
+        found = letters.find(self.at.upper())
+        return None if found < 0 else found + (len(self.at) - 1) // 2
 
 
 class Checks(_Part):
@@ -120,6 +138,7 @@ class Scene(_Part):
     model: Model = Model()
     continuum: Continuum = Continuum()
     wanted: Wanted
+    guest: Guest = Guest()
     checks: Checks = Checks()
     source: str = ""
     resolved: tuple[tuple[str, str, tuple[Region, ...] | None], ...] = ()
