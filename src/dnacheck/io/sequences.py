@@ -17,12 +17,13 @@ import stat
 import sys
 import warnings
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import groupby
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 from dnacheck.model.molecules import Molecule, embedded, embedded_names, is_embedded
 from dnacheck.model.sequence import parse_sequence
@@ -75,6 +76,18 @@ class Record:
         return Molecule(parse_sequence(self.letters, self.name))
 
 
+class Stretch(NamedTuple):
+    """Consecutive letters of a record."""
+
+    record: int
+    """Place of the record in its file, from 0."""
+    name: str
+    offset: int
+    """Letters of the record before these."""
+    letters: str
+    last: bool
+
+
 class SequenceSource:
     """A file, a pipe or standard input whose records can be read more than once.
 
@@ -123,7 +136,7 @@ class SequenceSource:
     @cached_property
     def count(self) -> int:
         """Number of records; reading them all finds every fault of the format."""
-        return sum(1 for _ in self.records())
+        return sum(stretch.last for stretch in self.stretches(_CHUNK))
 
     def records(self) -> Iterator[Record]:
         """Records in order, one at a time.
@@ -134,19 +147,43 @@ class SequenceSource:
             The content is neither FASTA nor GenBank, or holds no record; names the line.
         """
         found = False
-        try:
-            with self._text() as text:
-                for number, (header, letters) in enumerate(self._parsed(text), start=1):
-                    found = True
-                    words = header.split()
-                    yield Record(words[0] if words else f"record {number}", letters)
-        except (EOFError, zlib.error, gzip.BadGzipFile) as error:
-            reason = " ".join(str(error).split())
-            raise InputError(f"{self.label}: damaged gzip data ({reason}); copy it again") from None
-        except OSError as error:
-            raise self._unreadable(error) from None
+        with self._reading(), self._text() as text:
+            for number, (header, pieces) in enumerate(self._parsed(text), start=1):
+                found = True
+                words = header.split()
+                yield Record(words[0] if words else f"record {number}", "".join(pieces))
         if not found:
             raise InputError(f"{self.label}: no FASTA record; {_HEADER_HINT}")
+
+    def stretches(self, size: int) -> Iterator[Stretch]:
+        """Records in order, cut into stretches, so that a chromosome is never held whole.
+
+        Parameters
+        ----------
+        size : int
+            Letters of a stretch; the last one of a record may be shorter, an empty record has one
+            of none.
+
+        Raises
+        ------
+        InputError
+            As :meth:`records`.
+        """
+        with self._reading(), self._text() as text:
+            number = 0
+            for header, pieces in self._parsed(text):
+                number += 1
+                words = header.split()
+                name = words[0] if words else f"record {number}"
+                offset, held = 0, ""
+                for piece in pieces:
+                    held += piece
+                    while len(held) > size:
+                        yield Stretch(number - 1, name, offset, held[:size], False)
+                        offset, held = offset + size, held[size:]
+                yield Stretch(number - 1, name, offset, held, True)
+            if not number:
+                raise InputError(f"{self.label}: no FASTA record; {_HEADER_HINT}")
 
     def molecules(self) -> Iterator[Molecule | InputError]:
         """Molecules in order, one at a time; a bad record comes as its error."""
@@ -155,6 +192,16 @@ class SequenceSource:
                 yield record.molecule()
             except InputError as error:
                 yield error
+
+    @contextmanager
+    def _reading(self) -> Iterator[None]:
+        try:
+            yield
+        except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+            reason = " ".join(str(error).split())
+            raise InputError(f"{self.label}: damaged gzip data ({reason}); copy it again") from None
+        except OSError as error:
+            raise self._unreadable(error) from None
 
     def _opened(self) -> io.BufferedReader:
         if self._content is not None:
@@ -200,8 +247,8 @@ class SequenceSource:
         if b"\0" in start:
             raise InputError(f"{self.label}: not a text file; give FASTA or GenBank")
 
-    def _parsed(self, text: io.TextIOWrapper) -> Iterator[tuple[str, str]]:
-        """Header and letters of each record."""
+    def _parsed(self, text: io.TextIOWrapper) -> Iterator[tuple[str, Iterable[str]]]:
+        """Header and letters of each record, the letters in pieces."""
         lines = self._lines(text)
         ahead: list[tuple[int, str]] = []
         for number, line in lines:
@@ -218,11 +265,20 @@ class SequenceSource:
         whole = _chained(ahead, lines)
         if re.match(r"LOCUS\s", first):
             yield from self._genbank(whole)
-        else:
-            from Bio.SeqIO.FastaIO import SimpleFastaParser
-
-            for header, letters in SimpleFastaParser(self._fasta_lines(whole)):
-                yield header, "".join(letters.split())
+            return
+        # Parsers of libraries hold a record whole; a chromosome has to pass line by line.
+        header = ""
+        for is_header, group in groupby(self._fasta_lines(whole), lambda line: line[0] == ">"):
+            if not is_header:
+                yield header, ("".join(line.split()) for line in group)
+                header = ""
+                continue
+            for line in group:
+                if header:
+                    yield header, ()
+                header = line[1:].rstrip() or " "
+        if header:
+            yield header, ()
 
     def _lines(self, text: io.TextIOWrapper) -> Iterator[tuple[int, str]]:
         """Lines with their numbers, without a byte-order mark and undecoded bytes."""
@@ -254,7 +310,7 @@ class SequenceSource:
             if begun:
                 yield line
 
-    def _genbank(self, lines: Iterator[tuple[int, str]]) -> Iterator[tuple[str, str]]:
+    def _genbank(self, lines: Iterator[tuple[int, str]]) -> Iterator[tuple[str, Iterable[str]]]:
         from Bio import SeqIO
         from Bio.Seq import UndefinedSequenceError
 
@@ -279,7 +335,7 @@ class SequenceSource:
             except UndefinedSequenceError:
                 letters = ""
             known = record.id not in ("", ".", None) and not record.id.startswith("<")
-            yield (record.id if known else record.name), "".join(letters.split())
+            yield (record.id if known else record.name), letters.split()
 
 
 def read_target(target: str) -> Iterator[Molecule | InputError]:

@@ -190,7 +190,8 @@ def state_path(output: Path) -> Path:
     return output.with_name(output.name + ".state.json")
 
 
-def _settings(source: SequenceSource, arguments: Mapping[str, Any]) -> dict[str, Any]:
+def scan_settings(source: SequenceSource, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """What every row of a scan depends on: input, parameters and version."""
     plain = {
         key: value if isinstance(value, str | int | float | type(None)) else str(value)
         for key, value in arguments.items()
@@ -322,7 +323,7 @@ def scan(
     if Path(source.name).resolve() == output.resolve():
         raise InputError(f"file '{output}' is the input; name another one for the output")
     arguments = dict(options.chain_arguments)
-    settings = _settings(source, arguments)
+    settings = scan_settings(source, arguments)
     angles = arguments.get("angles", "trifonov2")
     arguments["angles"] = load_parameters(angles) if isinstance(angles, str) else angles
     handle, resumed, failures = _opened(source, output, settings, restart)

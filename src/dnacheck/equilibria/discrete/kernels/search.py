@@ -41,11 +41,11 @@ _SAME_ENERGY = 1e-7
 _SAME_ANGLES = 1e-4
 # A start so near (rad) to the register of the minimum that it was rolled away from falls back to
 # it; the 121 closest pairs among 20,000 random molecules were 1.2 rad apart and more.
-_REACH = 1.0
+REACH = 1.0
 # What the predicted energy may lack of a second minimum for one to be looked for, relative to a
 # circle's energy. Of 129 molecules with two minima within 3 RT among 20,000 random ones, 22 had
 # none predicted, and 22 of these lacked less than 0.0035.
-_LACKING = 0.005
+LACKING = 0.005
 # Starts that look for a second minimum of a link.
 _SECOND = 3
 # Where the first register of a link leads to no minimum, these are tried instead, in turns of it.
@@ -117,7 +117,7 @@ def _fill_rigid_start(
 @njit(cache=True, nogil=True)
 def _hinge_rows(steps: HingeSteps, link: int, along: Any, across: Any) -> float:
     register_functionals(steps.ground, steps.form, link, along, across)
-    return _REACH
+    return REACH
 
 
 @njit(cache=True, nogil=True)
@@ -258,11 +258,11 @@ def search_as_cut(
                     continue
                 start = rests[i, 1]
             elif k == 1:
-                if second or not lacking[i] < _LACKING:
+                if second or not lacking[i] < LACKING:
                     continue
                 start = rests[i, 2]
             elif k == 2:
-                if second or not lacking[i] < _LACKING:
+                if second or not lacking[i] < LACKING:
                     continue
                 # A planar ring rolled by psi has the register pi/2 - psi.
                 start = 1.5 * math.pi - registers[i]
