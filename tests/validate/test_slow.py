@@ -124,7 +124,57 @@ SABOTAGE = {
         ("quick", "wanted"),
         "wanted.energy",
     ),
+    "the sign of the writhe": (
+        "dnacheck/numerics/curve_topology.py",
+        "estimate = twist + writhe",
+        "estimate = twist - writhe",
+        ("quick", "essentials.link"),
+        "essentials.link",
+    ),
+    "the A-tract region moved by a step": (
+        "dnacheck/model/a_tracts.py",
+        "return _from_origin([(a - FLANK, b + FLANK) for a, b in regions], origin, n)",
+        "return _from_origin([(a - FLANK + 1, b + FLANK + 1) for a, b in regions], origin, n)",
+        ("quick", "essentials.a_tracts"),
+        "essentials.a_tracts",
+    ),
+    "half of 8 pi^2 in Laplace": (
+        "dnacheck/cyclization/laplace/isolated.py",
+        "math.log(8.0 * math.pi**2)",
+        "math.log(4.0 * math.pi**2)",
+        ("quick", "essentials.ln_J"),
+        "essentials.ln_J",
+    ),
+    "half of 8 pi^2 in the half chains": (
+        "dnacheck/cyclization/half_chain/kernels/pairs.py",
+        "math.log(8.0 * math.pi**2 / j)",
+        "math.log(4.0 * math.pi**2 / j)",
+        ("quick", "essentials.ln_J"),
+        "essentials.ln_J",
+    ),
+    "the rise": (
+        "dnacheck/model/chain.py",
+        "RISE_A = 3.4",
+        "RISE_A = 3.32",
+        ("quick", "essentials.energy"),
+        "essentials.energy",
+    ),
+    "a lost |cos theta|": (
+        "dnacheck/cyclization/ensembles/kernels/open_moves.py",
+        "return abs(math.cos(angles[1]))",
+        "return 1.0",
+        ("quick", "jfactor.measure"),
+        "jfactor.measure",
+    ),
+    "the fictitious pair off by one": (
+        "dnacheck/equilibria/discrete/kernels/states.py",
+        "state.boundary, state.centres[n], state.frames[n], state.turn",
+        "state.boundary, state.centres[n - 1], state.frames[n - 1], state.turn",
+        ("quick", "table2"),
+        "table2.discrete",
+    ),
 }
+"""The last seven were once let through; all are refused by what ``--quick`` runs."""
 
 
 @pytest.mark.parametrize("scene", sorted({scene for *_, (scene, _), _ in SABOTAGE.values()}))

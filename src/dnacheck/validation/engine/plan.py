@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from dnacheck.validation.engine.registry import Check, Level, all_checks
 from dnacheck.validation.scene.scene import Scene
 
-COMPARING_GROUPS = ("jfactor", "bead_chain")
-"""Groups that compute a quantity again by independent methods; the quantity itself, no dearer than
-its accuracy asks, comes from the group ``wanted``."""
+COMPARING_GROUPS = ("essentials", "jfactor", "bead_chain")
+"""Groups that compute a quantity again by independent methods, or another one to try the program;
+the quantity itself, no dearer than its accuracy asks, comes from the group ``wanted``."""
 
 
 @dataclass(frozen=True)

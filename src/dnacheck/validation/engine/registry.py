@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 GROUP_MODULES = (
     "table2",
+    "essentials",
     "requested",
     "discrete",
     "continuum",

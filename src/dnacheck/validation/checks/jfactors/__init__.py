@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from dnacheck.validation.checks.jfactors.acceptance import acceptance
+from dnacheck.validation.checks.jfactors.acceptance import acceptance, measure
 from dnacheck.validation.checks.jfactors.methods import laplace, pairwise
 from dnacheck.validation.checks.jfactors.straight import only_homopolymers, straight
 from dnacheck.validation.checks.jfactors.table3 import shifts, table3
 from dnacheck.validation.checks.jfactors.timing import speed
-from dnacheck.validation.engine.registry import Check, Findings, Group
+from dnacheck.validation.engine.registry import Check, Findings, Group, Level
 from dnacheck.validation.report.record import Block, Column, Table
 from dnacheck.validation.scene.scene import Scene
 
@@ -85,6 +85,9 @@ GROUP = Group(
               requires=("dnacheck.cyclization.closure.sampling",)),
         Check("jfactor.pairwise", "every two methods, half chains and Metropolis too", pairwise,
               45.0, _NEEDS, requires=("dnacheck.validation.reference.agreement",)),
+        Check("jfactor.measure", "pivot moves hold the measure of rotations", measure, 0.5,
+              level=Level.QUICK,
+              requires=("dnacheck.cyclization.ensembles.kernels.open_moves",)),
         Check("jfactor.acceptance", "Metropolis moves keep their distribution", acceptance, 12.0,
               _NEEDS, requires=("dnacheck.cyclization.ensembles.kernels.open_moves",)),
         Check("jfactor.table3", "Table III", table3, 6.0, _NEEDS, applies=_paper,

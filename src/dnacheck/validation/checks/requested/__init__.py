@@ -10,10 +10,12 @@ from dnacheck.validation.engine.registry import Check, Group, Level
 
 GROUP = Group(
     "wanted",
-    "What the scene asked for",
-    "Each quantity by the cheapest model whose measured error is within the wish.",
+    "The quantities you asked for",
+    "The scene file, its [wanted] table, names quantities and the accuracy each must have. Ring "
+    "energies are the discrete chain's; the others are computed by the cheapest model or method "
+    "whose measured error is within that accuracy.",
     (
-        Check("wanted.energy", "ring energies by the cheapest model", energy, 2.0, ("energy",),
+        Check("wanted.energy", "ring energies of the discrete chain", energy, 2.0, ("energy",),
               Level.QUICK),
         Check("wanted.continuum_energy", "continuum energies on the coarsest mesh that suffices",
               continuum_energy, 3.0, ("continuum_energy",), Level.QUICK),
