@@ -35,6 +35,7 @@ COMMAND_HELP = {
     "diagram": "Bifurcation diagram: energy and end moment against end twist.",
     "jfactor": "Cyclization probability (J factor) of a molecule.",
     "loop": "A loop between two sites held in a pose: energies and J.",
+    "pull": "A molecule under force and torque: shape, extension and turns.",
     "profile": "J factor against length.",
     "sensitivity": "What each step and each letter does to ln J.",
     "fit": "Mechanics from measured J factors.",

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+import dnacheck as dc
 from dnacheck.commands.common import (
     ModelSettings,
     RunSettings,
@@ -72,17 +73,11 @@ def command(
     from dnacheck.equilibria.boundary import Loop
     from dnacheck.equilibria.discrete.boundary_search import find_equilibria
     from dnacheck.io.poses import read_pose
-    from dnacheck.io.sequences import read_target
-    from dnacheck.model.chain import build_chain
+    from dnacheck.io.sequences import read_one
     from dnacheck.model.segments import between
-    from dnacheck.numerics.outcome import InputError, SolveError
+    from dnacheck.numerics.outcome import SolveError
 
-    molecules = list(read_target(target))
-    if len(molecules) > 1:
-        raise InputError(f"'{target}' holds {len(molecules)} records; give one molecule")
-    if isinstance(molecules[0], InputError):
-        raise molecules[0]
-    chain = between(build_chain(molecules[0], **model.chain_arguments()), *sites)
+    chain = between(dc.chain(read_one(target, "a loop"), **model.chain_arguments()), *sites)
     position, rotation = read_pose(pose)
     boundary = Loop(tuple(position), tuple(map(tuple, rotation)))
     search = find_equilibria(chain, boundary)
@@ -105,7 +100,7 @@ def command(
                     warnings.append(f"{method.name}: {error}")
                 advance(1)
     record = {
-        "target": molecules[0].name,
+        "target": target,
         "sites": list(sites),
         "n_bp": chain.n_steps,
         "pose": {"position_A": list(position), "rotation": [list(row) for row in rotation]},
