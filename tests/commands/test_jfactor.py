@@ -79,7 +79,7 @@ def test_a_tolerance_out_of_reach_gives_the_best_so_far(capsys):
     # the limit counts compilation too: that is done first
     assert run(capsys, "jfactor", "12A09", "--tolerance", "0.05")[0] == 0
     code, out, _ = run(
-        capsys, "jfactor", "12A09", "--json", "--tolerance", "1e-5", "--max-seconds", "2"
+        capsys, "jfactor", "12A09", "--json", "--tolerance", "1e-5", "--max-seconds", "4"
     )
     record = json.loads(out)
     assert code == 3
@@ -91,7 +91,7 @@ def test_a_tolerance_out_of_reach_gives_the_best_so_far(capsys):
 @pytest.mark.parametrize("method", ["closure", "half-chain"])
 def test_time_runs_out_for_every_sampler(capsys, method):
     assert run(capsys, "jfactor", "08T15", "--method", method, "--tolerance", "0.5")[0] == 0
-    limit = ("--tolerance", "1e-5", "--max-seconds", "2")
+    limit = ("--tolerance", "1e-5", "--max-seconds", "4")
     code, out, _ = run(capsys, "jfactor", "08T15", "--json", "--method", method, *limit)
     record = json.loads(out)
     assert code == 3

@@ -19,10 +19,11 @@ from dnacheck.equilibria.discrete.search import find_rings
 from dnacheck.io.sequences import SequenceSource
 from dnacheck.model.chain import build_chain
 from dnacheck.model.parameters import load_parameters
-from dnacheck.model.sequence import parse_sequence
+from dnacheck.model.sequence import parse_sequence, reverse_complement
 from dnacheck.numerics.outcome import InputError
 from dnacheck.scanning.scan import (
     COLUMNS,
+    OTHER_STRAND_COLUMNS,
     STATUS_FOUND,
     ScanOptions,
     scan,
@@ -69,6 +70,32 @@ def test_rows_equal_the_full_search(library, tmp_path):
         assert row["quality"] == quick.quality
         # Other numbers for the draws: the scan's molecule is cut elsewhere.
         assert float(row["minus_lnJ"]) == pytest.approx(-quick.log_j, abs=8.0 * quick.stderr)
+
+
+def test_the_other_strand_on_request(tmp_path):
+    """Its columns are what a scan of the reverse complements finds; the mid-step form has none."""
+    library = random_fasta(tmp_path / "few.fasta", 6, 3)
+    records = list(SequenceSource(library).records())
+    across = tmp_path / "across.fasta"
+    across.write_text("".join(f">{r.name}\n{reverse_complement(r.letters)}\n" for r in records))
+    files = {}
+    for form in ("wedge", "midstep"):
+        options = {"a_tracts": "none", "step_form": form}
+        files[form] = tmp_path / f"{form}.csv", tmp_path / f"{form}_across.csv"
+        scan(library, files[form][0], ScanOptions(options, other_strand=True))
+        scan(across, files[form][1], ScanOptions(options))
+    differ = 0
+    for form, (both, other) in files.items():
+        for row, reverse in zip(rows_of(both), rows_of(other), strict=True):
+            assert tuple(row) == COLUMNS + OTHER_STRAND_COLUMNS
+            assert row["other_strand_energy_RT"] == reverse["energy_RT"]
+            assert row["other_strand_minus_lnJ"] == reverse["minus_lnJ"]
+            apart = abs(float(row["energy_RT"]) - float(reverse["energy_RT"]))
+            assert form == "wedge" or apart <= 2e-6
+            differ += apart > 1e-3
+    assert differ >= 4  # the wedge form: the check can tell strands apart
+    with pytest.raises(InputError, match="other other_strand"):
+        scan(library, files["wedge"][0], ScanOptions({"a_tracts": "none", "step_form": "wedge"}))
 
 
 def test_model_options_reach_the_rows(library, tmp_path):

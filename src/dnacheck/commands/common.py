@@ -59,6 +59,8 @@ class ModelSettings:
     """Å per base-pair step; None for 3.4, or what a set with six parameters brings."""
     a_tracts: Literal["auto", "tracts-only", "none"] | tuple[int, int]
     """Steps with the A-tract twist: by a rule, none, or first and last (0-based, included)."""
+    step_form: Literal["wedge", "midstep"] = "wedge"
+    """How three angles make a step: as the paper's wedge, or symmetric in the strands."""
 
     def chain_arguments(self) -> dict[str, Any]:
         """Keyword arguments of :func:`dnacheck.chain`."""
@@ -68,6 +70,7 @@ class ModelSettings:
             "persistence_length_A": self.persistence_length,
             "rise_A": self.rise,
             "a_tracts": self.a_tracts if isinstance(self.a_tracts, str) else (self.a_tracts,),
+            "step_form": self.step_form,
         }
 
     def build_arguments(self) -> dict[str, Any]:
@@ -234,6 +237,15 @@ def model_options(function: Function) -> Function:
                 default="auto",
                 show_default=True,
                 help="Steps with the A-tract twist, 0-based, both ends included.",
+            ),
+            click.option(
+                "--step-form",
+                "model__step_form",
+                type=click.Choice(["wedge", "midstep"]),
+                default="wedge",
+                show_default=True,
+                help="How three angles make a step: the paper's wedge, whose values depend on "
+                "the strand that is read, or the mid-step form, which knows no strand.",
             ),
         ],
     )

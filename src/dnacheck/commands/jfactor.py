@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -21,6 +22,7 @@ from dnacheck.commands.common import (
     target_argument,
 )
 from dnacheck.commands.option_types import LinkChoice, Number
+from dnacheck.commands.other_strand import other_strand_chain, other_strand_option, remark
 from dnacheck.commands.output import note, print_json, progress
 from dnacheck.commands.time_limit import within
 from dnacheck.cyclization.methods import METHODS, method_named
@@ -60,6 +62,7 @@ EXIT_NOT_CONVERGED = 3
     "--link", type=LinkChoice(), default="auto", show_default=True, help="Links to search."
 )
 @ends_option("ends")
+@other_strand_option
 @model_options
 @bind_option
 @common_options
@@ -70,6 +73,7 @@ def command(
     max_seconds: float | None,
     link: Any,
     ends: str,
+    both_strands: bool,
     model: ModelSettings,
     bind: tuple[str, ...],
     run: RunSettings,
@@ -90,6 +94,32 @@ def command(
     if len(molecules) == 1 and isinstance(molecules[0], InputError):
         raise molecules[0]
     refused = False
+
+    def compute(chain: Chain, left: float) -> tuple[JFactor, Binding | None]:
+        searching = time.perf_counter()
+        with progress(f"{chain.name}: draws", None, run.quiet or run.json) as advance:
+            result = dc.jfactor(
+                chain,
+                way,
+                link=link,
+                ends=ends,
+                rng=run.seed,
+                threads=run.threads,
+                progress=advance,
+                tolerance=tolerance,
+                # A bound molecule leaves half of the time to the free one.
+                max_seconds=left * (0.5 if chain.guests else 1.0),
+            )
+        if not chain.guests:
+            return result, None
+        from dnacheck.cyclization.binding import binding
+        from dnacheck.cyclization.method import Run
+        from dnacheck.equilibria.discrete.search import SearchOptions
+
+        rest = max(left - (time.perf_counter() - searching), 1e-3)
+        asked = Run(run.seed, run.threads, None, tolerance, rest)
+        return result, binding(chain, way, asked, SearchOptions(links=link), result)
+
     for molecule in molecules:
         if isinstance(molecule, InputError):
             note(str(molecule))
@@ -99,33 +129,8 @@ def command(
         chain = with_guests(dc.chain(molecule, **model.chain_arguments()), bind)
         check_link(link, chain.n_steps)
 
-        def compute(left: float, chain: Chain = chain) -> tuple[JFactor, Binding | None]:
-            searching = time.perf_counter()
-            with progress(f"{chain.name}: draws", None, run.quiet or run.json) as advance:
-                result = dc.jfactor(
-                    chain,
-                    way,
-                    link=link,
-                    ends=ends,
-                    rng=run.seed,
-                    threads=run.threads,
-                    progress=advance,
-                    tolerance=tolerance,
-                    # A bound molecule leaves half of the time to the free one.
-                    max_seconds=left * (0.5 if chain.guests else 1.0),
-                )
-            if not chain.guests:
-                return result, None
-            from dnacheck.cyclization.binding import binding
-            from dnacheck.cyclization.method import Run
-            from dnacheck.equilibria.discrete.search import SearchOptions
-
-            rest = max(left - (time.perf_counter() - searching), 1e-3)
-            asked = Run(run.seed, run.threads, None, tolerance, rest)
-            return result, binding(chain, way, asked, SearchOptions(links=link), result)
-
         try:
-            result, linkage = within(max_seconds, compute)
+            result, linkage = within(max_seconds, partial(compute, chain))
         except (SolveError, TimeLimitReachedError) as error:
             if run.json and len(molecules) == 1:
                 raise
@@ -133,10 +138,11 @@ def command(
             good = False
             records.append(_failure(chain.name, chain.n_steps, method, error, began))
             continue
-        records.append(result.to_dict())
+        record = {**result.to_dict(), "step_form": chain.step_form, "other_strand": None}
+        records.append(record)
         good = good and (result.status.ok or not way.measures_error)
         if linkage is not None:
-            records[-1]["binding"] = linkage.to_dict()
+            record["binding"] = linkage.to_dict()
             good = good and (linkage.free.status.ok or not way.measures_error)
         if not run.json:
             _print(result)
@@ -144,6 +150,19 @@ def command(
                 _print_binding(linkage)
             for warning in result.warnings:
                 note(f"{chain.name}: {warning}", run.quiet)
+        other = other_strand_chain(molecule, chain, model) if both_strands else None
+        if other is None:
+            continue
+        try:
+            across, _ = within(max_seconds, partial(compute, other))
+        except (SolveError, TimeLimitReachedError) as error:
+            record["warnings"].append(f"other strand: {error}")
+            note(f"{chain.name}: other strand: {error}", run.quiet)
+            continue
+        record["other_strand"] = {"minus_lnJ": across.minus_lnJ, "stderr": across.stderr}
+        if not run.json:
+            error_bar = f" ± {across.stderr:.4f}" if across.stderr > 0.0 else ""
+            print(f"  {remark(molecule, f'-ln J = {across.minus_lnJ:.4f}{error_bar}')}")
     if run.json:
         print_json(records[0] if len(molecules) == 1 else {"results": records})
     if refused:

@@ -22,6 +22,7 @@ from dnacheck.commands.common import (
     ring_options,
     target_argument,
 )
+from dnacheck.commands.other_strand import other_strand_chain, other_strand_option, remark
 from dnacheck.commands.output import note, print_json, progress
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ _SOFT_RT = 5.0
     default=None,
     help="Write the lowest ring as a .pdb, .gro or .cif file, or one of these and .gz.",
 )
+@other_strand_option
 @model_options
 @ring_options
 @continuum_options
@@ -56,6 +58,7 @@ _SOFT_RT = 5.0
 def command(
     target: str,
     structure: Path | None,
+    both_strands: bool,
     model: ModelSettings,
     ring: RingSettings,
     continuum: ContinuumSettings,
@@ -86,11 +89,15 @@ def command(
                 note(str(molecule))
                 continue
             record, converged, found = _solve(molecule, structure, model, ring, continuum, bind)
+            other = other_strand_chain(molecule, found[0], model) if both_strands else None
+            record["other_strand"] = None if other is None else _lowest(other, ring, continuum)
             complete = complete and converged
             records.append(record)
             advance(1)
             if not run.json:
                 _print(record)
+                if other is not None:
+                    print(remark(molecule, _energy(record["other_strand"])))
             for warning in record["warnings"]:
                 # Why there is no ring is the answer, not a remark.
                 note(f"{record['target']}: {warning}", run.quiet and converged)
@@ -157,6 +164,7 @@ def _solve(
             {"name": guest.name, "site": guest.site, "steps": list(guest.steps)}
             for guest in chain.guests
         ],
+        "step_form": chain.step_form,
         "equilibria": equilibria,
         "comparison": comparison,
         "warnings": warnings,
@@ -173,6 +181,28 @@ def _without_continuum(ring: RingSettings, warnings: list[str]) -> RingSettings:
     if ring.model == "both":
         warnings.append("continuum: left out, for the rod holds no guests")
     return replace(ring, model="discrete")
+
+
+def _lowest(
+    chain: Chain, ring: RingSettings, continuum: ContinuumSettings
+) -> dict[str, Any] | None:
+    """Energy and link of the lowest ring of the other strand, discrete unless only the rod's."""
+    warnings: list[str] = []
+    if ring.model == "continuum":
+        lowest, _ = _continuum(chain, ring, continuum, warnings)
+    else:
+        lowest, _ = _discrete(chain, ring, warnings)
+    if lowest is None:
+        return None
+    entry = lowest.to_dict()
+    return {key: entry[key] for key in ("model", "energy_RT", "link")}
+
+
+def _energy(lowest: dict[str, Any] | None) -> str:
+    if lowest is None:
+        return "no ring was found"
+    link = "" if lowest["link"] is None else f", link {lowest['link']}"
+    return f"{lowest['energy_RT']:.4f} RT, {lowest['model']}{link}"
 
 
 def _discrete_only(ring: RingSettings, warnings: list[str]) -> RingSettings:

@@ -7,12 +7,14 @@ from pathlib import Path
 
 import click
 
+from dnacheck.commands import option_types as allowed
 from dnacheck.commands.common import (
     ModelSettings,
     RunSettings,
     common_options,
     model_options,
 )
+from dnacheck.commands.option_types import Count
 from dnacheck.commands.output import note, print_json, progress
 
 EXIT_NOT_CONVERGED = 3
@@ -35,18 +37,29 @@ Examples:  dnacheck scan library.fasta -o library.csv
     "--window); may be given several times. An unfinished one is gone on with.",
 )
 @click.option("--restart", is_flag=True, help="Replace an existing output.")
-@click.option("--window", type=int, help="Scan every window of so many base pairs.")
-@click.option("--step", type=int, default=1, show_default=True, help="From window to window.")
+@click.option(
+    "--window", type=Count(allowed.WINDOW), help="Scan every window of so many base pairs."
+)
+@click.option(
+    "--step", type=Count(allowed.STEP), default=1, show_default=True, help="From window to window."
+)
 @click.option("--both-strands", is_flag=True, help="Read each window from both strands.")
 @click.option("--region", metavar="NAME:A-B", help="Windows inside base pairs A to B, from 1.")
-@click.option("--piece", type=int, help="Windows of a piece of work and file.  [default: 16384]")
+@click.option(
+    "--piece",
+    type=Count(allowed.PIECE),
+    help="Windows of a piece of work and file.  [default: 16384]",
+)
 @click.option(
     "--workers",
-    type=click.IntRange(1, 1024),
+    type=Count(allowed.THREADS),
     help="Local worker processes (Dask's where dnacheck[cluster] is installed).",
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Use the workers of a Dask scheduler.")
 @click.option("--dry-run", is_flag=True, help="Say how many rows, how long and how much disk.")
+@click.option(
+    "--other-strand", is_flag=True, help="Two more columns of records: what the other strand gives."
+)
 @model_options
 @common_options
 def command(
@@ -61,6 +74,7 @@ def command(
     workers: int | None,
     scheduler: str | None,
     dry_run: bool,
+    other_strand: bool,
     model: ModelSettings,
     run: RunSettings,
 ) -> int | None:
@@ -92,7 +106,11 @@ def command(
     source = SequenceSource(fasta)
     plain = len(outputs) == 1 and outputs[0].suffix.lower() != ".parquet"
     if windowed is None and plain and not (workers or scheduler or dry_run):
-        return _records(source, outputs[0], restart, model, run)
+        return _records(source, outputs[0], restart, other_strand, model, run)
+    if other_strand:
+        raise InputError(
+            "--other-strand is of whole records in one CSV file; windows have --both-strands"
+        )
     from dnacheck.scanning.batch import Plan, batch_line
     from dnacheck.scanning.batch import run as run_plan
 
@@ -114,14 +132,19 @@ def command(
 
 
 def _records(
-    source: object, output: Path, restart: bool, model: ModelSettings, run: RunSettings
+    source: object,
+    output: Path,
+    restart: bool,
+    other_strand: bool,
+    model: ModelSettings,
+    run: RunSettings,
 ) -> int | None:
     """Whole records into a CSV file, row by row."""
     from dnacheck.io.sequences import SequenceSource
     from dnacheck.scanning.scan import ScanOptions, scan, state_path, summary_line
 
     assert isinstance(source, SequenceSource)
-    options = ScanOptions(model.build_arguments(), run.threads)
+    options = ScanOptions(model.build_arguments(), run.threads, other_strand)
     with progress("sequences", source.count, run.quiet or run.json) as advance:
         summary = scan(source, output, options, advance, restart)
     if run.json:

@@ -16,8 +16,8 @@ Result = TypeVar("Result")
 
 LEFT_BEHIND = "left behind"
 """Name of a thread that goes on after its result was given up."""
-_MARGIN = 0.02
-_LEAST_MARGIN_SECONDS = 0.3
+_MARGIN = 0.05
+_LEAST_MARGIN_SECONDS = 1.0
 """How much longer than its limit a method may take to hand over what it has."""
 
 

@@ -115,7 +115,9 @@ def _results(
         yield from halves()
     else:
         yield from _laplace_values(profile, search, pilot, run.tolerance)
-        yield from _corrected(profile, pilot, replace(run, rng=seeds[3]))
+        correcting = left(seeds[3])
+        if correcting is not None:
+            yield from _corrected(profile, pilot, correcting)
     sampling = left(seeds[1], least=1e-3)
     assert sampling is not None
     yield ClosureSampling().run(profile, sampling)
@@ -141,10 +143,11 @@ def _laplace_values(
 
 
 def _corrected(profile: RegisterProfile, pilot: JFactor, run: Run) -> Iterator[JFactor]:
-    """The first anharmonic term, for no more closed shapes than sampling would take."""
+    """The first anharmonic term, for no more closed shapes than sampling takes or has time for."""
     from dnacheck.cyclization.laplace.anharmonic import AnharmonicOptions, corrected_laplace
 
     draws = pilot.samples * (pilot.stderr / run.tolerance) ** 2
+    draws = min(draws, pilot.samples * run.max_seconds / max(pilot.seconds, 1e-3))
     pairs = int(min(draws, 1e6) / _DRAWS_A_PAIR)
     if pairs < _TERM_PAIRS:
         return

@@ -36,6 +36,14 @@ def region_steps(region: Region, n_steps: int) -> NDArray[np.intp]:
     return np.arange(first, last + 1 if first <= last else last + 1 + n_steps) % n_steps
 
 
+def mirrored_region(region: Region, n_steps: int) -> Region:
+    """A ring's region as its other strand counts steps: step i is step N - 2 - i there."""
+    first, last = region
+    if (first, last) == (0, n_steps - 1):
+        return region
+    return (n_steps - 2 - last) % n_steps, (n_steps - 2 - first) % n_steps
+
+
 def automatic_regions(letters: str, closed: bool = True) -> tuple[Region, ...]:
     """Regions that rule ``auto`` of this module finds, in order along the molecule.
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from dnacheck.model.a_tracts import Region
+from dnacheck.model.a_tracts import Region, mirrored_region
 from dnacheck.model.data_files import data_directory
 from dnacheck.model.sequence import Sequence, parse_sequence
 from dnacheck.numerics.outcome import InputError
@@ -25,6 +25,18 @@ class Molecule:
     def name(self) -> str:
         """Name of the molecule."""
         return self.sequence.name
+
+    def other_strand(self, regions: tuple[Region, ...]) -> Molecule:
+        """The same ring read on its other strand, with the steps that take the A-tract twist.
+
+        ``regions`` are those that this strand takes; rule ``auto`` by itself, applied to the other
+        strand, would move them by one step.
+        """
+        n = len(self.sequence)
+        return Molecule(
+            self.sequence.reverse_complement(),
+            tuple(mirrored_region(region, n) for region in regions),
+        )
 
 
 @cache

@@ -40,12 +40,15 @@ from dnacheck.io.sequences import Record, SequenceSource
 from dnacheck.model.chain import Chain, build_chain
 from dnacheck.model.chain_kernels import HingeSteps
 from dnacheck.model.cut import least_rotation
+from dnacheck.model.molecules import Molecule
 from dnacheck.model.parameters import ParameterSet, load_parameters
 from dnacheck.model.sequence import parse_sequence
 from dnacheck.numerics.outcome import InputError
 from dnacheck.scanning import kernels as sk
 
 COLUMNS = ("name", "n_bp", "link", "energy_RT", "energy_reduced", "minus_lnJ", "status", "quality")
+OTHER_STRAND_COLUMNS = ("other_strand_energy_RT", "other_strand_minus_lnJ")
+"""Behind the others where they are asked for; equal to them unless the step form is the wedge."""
 _STATUS = COLUMNS.index("status")
 STATUS_FOUND = "ok"
 STATUS_NO_RING = "no stable ring found at any link searched"
@@ -74,14 +77,22 @@ class ScanOptions:
     chain_arguments : mapping
         Keyword arguments of :func:`dnacheck.model.chain.build_chain`.
     threads : int
+    other_strand : bool
+        Whether rows have the columns :data:`OTHER_STRAND_COLUMNS` too.
     """
 
     chain_arguments: Mapping[str, Any] = field(default_factory=dict)
     threads: int = 1
+    other_strand: bool = False
 
     def __post_init__(self) -> None:
         if self.threads < 1:
             raise InputError(f"threads must be at least 1, not {self.threads}")
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The header of the file."""
+        return COLUMNS + OTHER_STRAND_COLUMNS if self.other_strand else COLUMNS
 
 
 @dataclass(frozen=True)
@@ -114,16 +125,36 @@ class ScanSummary:
         return self.rows - sum(self.reasons.values())
 
 
-def scan_row(name: str, letters: str, arguments: Mapping[str, Any]) -> list[str]:
+def scan_row(
+    name: str, letters: str, arguments: Mapping[str, Any], other_strand: bool = False
+) -> list[str]:
     """The cells of one record; a record that cannot be computed has the reason as its status."""
     letters = "".join(letters.split())
     cells = [name, str(len(letters)), "", "", "", ""]
+    others = [""] * len(OTHER_STRAND_COLUMNS) if other_strand else []
     try:
         if len(letters) > _LONGEST:
             raise InputError(f"{len(letters)} base pairs are more than {_LONGEST}; leave it out")
-        chain = build_chain(parse_sequence(letters, name), **arguments)
+        molecule = Molecule(parse_sequence(letters, name))
+        chain = build_chain(molecule, **arguments)
     except InputError as error:
-        return [*cells, " ".join(str(error).split()), ""]
+        return [*cells, " ".join(str(error).split()), "", *others]
+    if other_strand:
+        across = molecule.other_strand(chain.a_tract_regions)
+        row = dict(
+            zip(
+                COLUMNS,
+                _row(name, build_chain(across, **{**arguments, "a_tracts": "auto"})),
+                strict=True,
+            )
+        )
+        others = [row["energy_RT"], row["minus_lnJ"]]
+    return [*_row(name, chain), *others]
+
+
+def _row(name: str, chain: Chain) -> list[str]:
+    """The cells of a chain."""
+    cells = [name, str(chain.n_steps), "", "", "", ""]
     figures = np.empty(sk.N_SCAN_FIGURES)
     scale = chain.energy_scale_RT
     plan = search_plan(chain)
@@ -173,9 +204,11 @@ def _text(rows: list[list[str]]) -> bytes:
     return buffer.getvalue().encode()
 
 
-def _block_text(block: list[Record], arguments: Mapping[str, Any]) -> tuple[bytes, list[str]]:
+def _block_text(
+    block: list[Record], arguments: Mapping[str, Any], other_strand: bool
+) -> tuple[bytes, list[str]]:
     """Rows of a block as text, and the statuses that are not ``ok``."""
-    rows = [scan_row(record.name, record.letters, arguments) for record in block]
+    rows = [scan_row(record.name, record.letters, arguments, other_strand) for record in block]
     return _text(rows), [row[_STATUS] for row in rows if row[_STATUS] != STATUS_FOUND]
 
 
@@ -218,13 +251,15 @@ def _angle_digest(table: ParameterSet) -> str:
     return digest.hexdigest()
 
 
-def _whole_rows(handle: BinaryIO, source: SequenceSource) -> tuple[int, int, list[str]]:
+def _whole_rows(
+    handle: BinaryIO, source: SequenceSource, columns: tuple[str, ...]
+) -> tuple[int, int, list[str]]:
     """Rows of an unfinished output that agree with the input, their bytes, and what failed.
 
     A row counts if it ends in a newline, has all columns, and names the record at its place; what
     follows the last such row (half a line, blocks of zeros after a power failure) does not.
     """
-    header = _text([list(COLUMNS)])
+    header = _text([list(columns)])
     handle.seek(0)
     if handle.readline() != header:
         return 0, 0, []
@@ -243,7 +278,7 @@ def _whole_rows(handle: BinaryIO, source: SequenceSource) -> tuple[int, int, lis
             cells = next(csv.reader(io.StringIO(pending.decode())))
         except (UnicodeDecodeError, csv.Error, StopIteration):
             break
-        if record is None or len(cells) != len(COLUMNS) or cells[0] != record.name:
+        if record is None or len(cells) != len(columns) or cells[0] != record.name:
             break
         rows += 1
         if cells[_STATUS] != STATUS_FOUND:
@@ -254,7 +289,11 @@ def _whole_rows(handle: BinaryIO, source: SequenceSource) -> tuple[int, int, lis
 
 
 def _opened(
-    source: SequenceSource, output: Path, settings: dict[str, Any], restart: bool
+    source: SequenceSource,
+    output: Path,
+    settings: dict[str, Any],
+    restart: bool,
+    columns: tuple[str, ...],
 ) -> tuple[BinaryIO, int, list[str]]:
     """The output ready for the next row, how many rows it has, and which of them failed."""
     state = state_path(output)
@@ -281,11 +320,11 @@ def _opened(
         raise InputError(
             f"cannot write '{output}': {error.strerror}; name a file in a writable directory"
         ) from error
-    rows, size, failures = (0, 0, []) if fresh else _whole_rows(handle, source)
+    rows, size, failures = (0, 0, []) if fresh else _whole_rows(handle, source, columns)
     handle.seek(size)
     handle.truncate()
     if size == 0:
-        handle.write(_text([list(COLUMNS)]))
+        handle.write(_text([list(columns)]))
     return handle, rows, failures
 
 
@@ -303,7 +342,7 @@ def scan(
     source : path or SequenceSource
         FASTA or GenBank, as :class:`dnacheck.io.sequences.SequenceSource` reads it.
     output : Path
-        CSV file with the columns :data:`COLUMNS`; J is that of
+        CSV file with the columns of the options; J is that of
         :mod:`dnacheck.cyclization.laplace.quick`, and ``quality`` how far to believe it: good,
         fair or poor, or :data:`QUALITY_LAPLACE`.
     progress : callable, optional
@@ -324,9 +363,11 @@ def scan(
         raise InputError(f"file '{output}' is the input; name another one for the output")
     arguments = dict(options.chain_arguments)
     settings = scan_settings(source, arguments)
+    if options.other_strand:
+        settings["other_strand"] = True
     angles = arguments.get("angles", "trifonov2")
     arguments["angles"] = load_parameters(angles) if isinstance(angles, str) else angles
-    handle, resumed, failures = _opened(source, output, settings, restart)
+    handle, resumed, failures = _opened(source, output, settings, restart, options.columns)
     reasons = Counter(map(_reason, failures))
     failed = 0
     done = resumed
@@ -343,7 +384,8 @@ def scan(
                         block = list(islice(stream, _BLOCK))
                         if not block:
                             break
-                        pending.append((pool.submit(_block_text, block, arguments), len(block)))
+                        work = pool.submit(_block_text, block, arguments, options.other_strand)
+                        pending.append((work, len(block)))
                     if not pending:
                         break
                     future, size = pending.popleft()

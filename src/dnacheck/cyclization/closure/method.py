@@ -62,7 +62,10 @@ class ClosureSampling(Method):
             return self.with_gradient(target, run)
         from dnacheck.cyclization.closure.sampling import ClosureSampler
 
-        sampler = ClosureSampler(register_profile_of(target), self.options(run), run.rng)
+        began = time.perf_counter()
+        profile = register_profile_of(target)
+        left = max(run.max_seconds - (time.perf_counter() - began), 1e-3)
+        sampler = ClosureSampler(profile, self.options(replace(run, max_seconds=left)), run.rng)
         return sampler.sample(run.progress)
 
     def with_gradient(self, target: Target, run: Run) -> JFactor:
