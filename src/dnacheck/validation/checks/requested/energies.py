@@ -30,6 +30,14 @@ if TYPE_CHECKING:
 
 SHOWN_ROWS = 500
 LARGEST_RESIDUAL = 1e-9
+_FORM = {
+    "wedge": "Steps are the paper's wedges: read from its other strand a molecule of one's own may "
+    "differ by a few per cent.",
+    "midstep": "Steps are in the midstep form, the same from either strand but for the ends of "
+    "A-tract regions.",
+    "rigid": "Steps have six parameters, the same from either strand.",
+}
+"""What the form of the steps means for a molecule of one's own."""
 
 
 def energy(context: Context) -> Findings:
@@ -102,12 +110,13 @@ def energy(context: Context) -> Findings:
         Column("status", "Status"),
     ]
     cut = f" The first {SHOWN_ROWS} of {len(rows)}." if len(rows) > SHOWN_ROWS else ""
+    form = _FORM[variants[0][2].step_form]
     table = Table(
         "energies",
         "Ring energies",
         columns,
         rows[:SHOWN_ROWS],
-        f"Lowest ring of each molecule, of the discrete chain.{cut}",
+        f"Lowest ring of each molecule, of the discrete chain. {form}{cut}",
         summary=not context.scene.checks.against_paper and len(rows) <= 30,
         collapsed=len(rows) > 30,
     )
