@@ -69,38 +69,37 @@ def command(
     The pose is that of the second site seen from the first, along its directors: d1 and d2 across
     the axis, d3 along it.
     """
-    from dnacheck.cyclization.methods import ClosureSampling, Laplace
-    from dnacheck.equilibria.boundary import Loop
-    from dnacheck.equilibria.discrete.boundary_search import find_equilibria
     from dnacheck.io.poses import read_pose
     from dnacheck.io.sequences import read_one
     from dnacheck.model.segments import between
-    from dnacheck.numerics.outcome import SolveError
 
-    chain = between(dc.chain(read_one(target, "a loop"), **model.chain_arguments()), *sites)
+    molecule = read_one(target, "a loop")
+    chain = between(dc.chain(molecule, **model.chain_arguments()), *sites)
     position, rotation = read_pose(pose)
-    boundary = Loop(tuple(position), tuple(map(tuple, rotation)))
-    search = find_equilibria(chain, boundary)
-    _ = search.lowest
+    search = dc.rings(chain, ends=dc.Loop(tuple(position), tuple(map(tuple, rotation))))
     results: list[JFactor] = []
     warnings = list(chain.warnings)
     if chain.rigid:
         warnings.append("J: left out, for steps of six parameters have none yet")
     else:
-        methods = [Laplace(), Laplace(register=True, order=1), ClosureSampling()]
+        methods = [dc.Laplace(), dc.Laplace(register=True, order=1), dc.ClosureSampling()]
         with progress(f"{chain.name}: J", len(methods), run.quiet or run.json) as advance:
             for method in methods:
                 try:
                     results.append(
-                        method.compute(
-                            search, rng=run.seed, threads=run.threads, tolerance=_TOLERANCE
+                        dc.jfactor(
+                            search,
+                            method,
+                            rng=run.seed,
+                            threads=run.threads,
+                            tolerance=_TOLERANCE,
                         )
                     )
-                except SolveError as error:
+                except dc.SolveError as error:
                     warnings.append(f"{method.name}: {error}")
                 advance(1)
     record = {
-        "target": target,
+        "target": molecule.name,
         "sites": list(sites),
         "n_bp": chain.n_steps,
         "pose": {"position_A": list(position), "rotation": [list(row) for row in rotation]},

@@ -16,6 +16,7 @@ base pair on the last step), the moment about the end's centre.
 
 from __future__ import annotations
 
+import math
 import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -389,7 +390,7 @@ class Equilibrium:
         """
         values = {column: getattr(self, column) for column in COLUMNS if column != "link"}
         values |= {"link": self.ring_link, "status": self.status.value}
-        return {column: values[column] for column in COLUMNS}
+        return {column: _finite(values[column]) for column in COLUMNS}
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the ring as a structure file, three atoms per base pair.
@@ -618,6 +619,11 @@ def _chain(source: Chain | Rod) -> Chain:
     if isinstance(source, Chain):
         return source
     raise InputError(f"{source.name}: this is a continuum rod; give a discrete chain")
+
+
+def _finite(value: Any) -> Any:
+    """None for a number that JSON does not have."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _text(value: object) -> str:
