@@ -8,6 +8,7 @@ import pytest
 
 from dnacheck.cyclization.binding import binding, facing_deg
 from dnacheck.cyclization.closure.method import ClosureSampling
+from dnacheck.cyclization.ensembles.metropolis import ClosedRingOptions, closed_ring_ensemble
 from dnacheck.cyclization.half_chain.method import HalfChain
 from dnacheck.cyclization.laplace.isolated import laplace
 from dnacheck.cyclization.laplace.method import Laplace
@@ -100,3 +101,25 @@ def test_positive_kinks_turn_the_major_groove_of_their_steps_inwards(bound):
 def test_nothing_bound_is_refused(bound):
     with pytest.raises(InputError, match="holds no guest"):
         binding(bound.elastic(0.0), Laplace())
+
+
+def test_thermal_motion_of_a_bound_ring_by_two_kinds_of_moves():
+    chain = bind(closed_ground_chain(20, 2, 60.0), 5, "roll=25@0,1,2")
+    ring = find_rings(chain).lowest
+    runs = [
+        closed_ring_ensemble(chain, ring, options, rng)
+        for options, rng in (
+            (ClosedRingOptions(samples=300, constrained=0, copies=4), 1),
+            (ClosedRingOptions(samples=300, crankshafts=0, copies=4), 2),
+        )
+    ]
+    for run in runs:
+        assert run.angle_deviation[chain.bound].max() < 1e-12
+        assert run.angle_deviation[~chain.bound].min() > 1e-3
+    first, second = (run.energy_RT for run in runs)
+    assert abs(first.mean - second.mean) < 4.0 * math.hypot(first.stderr, second.stderr)
+    # Stiff steps move harmonically: half RT for each free angle, less the six of closure.
+    harmonic = ring.energy_RT + 0.5 * (3 * chain.n_free - 6)
+    assert abs(second.mean - harmonic) < 4.0 * second.stderr + 0.03 * harmonic
+    # Negative control: the held steps' angles do not count.
+    assert abs(second.mean - harmonic - 4.5) > 4.0 * second.stderr

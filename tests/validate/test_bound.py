@@ -79,3 +79,13 @@ def test_a_guest_without_a_wish_is_refused(tmp_path):
     text = SCENE.replace("binding = 0.2", "energy = 0.01") + "[guest]\nsteps = 'cap'\n"
     with pytest.raises(InputError, match="no wish"):
         scene_of(tmp_path, text)
+
+
+def test_free_rings_lead_to_bound_ones(tmp_path):
+    context = Context(scene_of(tmp_path, SCENE), Level.QUICK, seed=1)
+    found = bound.kinking(context)
+    (result,) = found.results
+    assert result.verdict is Verdict.PASS
+    (line,) = found.blocks[0].data["lines"]
+    assert line["x"][0] == 0.0
+    assert line["x"][-1] == 1.0

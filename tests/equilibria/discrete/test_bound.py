@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dnacheck.equilibria.boundary import Loop, NickedRing
+from dnacheck.equilibria.discrete.bound_search import follow_binding
 from dnacheck.equilibria.discrete.boundary_search import find_equilibria
 from dnacheck.equilibria.discrete.kernels.search import fill_start
 from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
@@ -185,3 +186,18 @@ def test_minima_are_those_of_many_starts():
             ring = solve_ring(chain, start, throw=False)
             if ring.status.ok and ring.stable:
                 assert ring.energy > known.lowest.energy - 1e-9
+
+
+def test_the_bound_ring_is_followed_from_the_free_one():
+    chain = bind(chain_of("wedge"), 125, "cap")
+    path = follow_binding(chain, points=9)
+    shares = [share for share, _ in path]
+    assert shares[0] == 0.0
+    assert shares[-1] == 1.0
+    free = find_rings(chain.elastic(0.0)).lowest
+    # Steps held unstressed give up the energy that they stored, and cost the rest a little more.
+    assert abs(path[0][1].energy_RT - free.energy_RT) < 1.0
+    assert path[-1][1].energy_RT == pytest.approx(find_rings(chain).lowest.energy_RT, rel=1e-9)
+    finer = dict(follow_binding(chain, points=17))
+    for share, ring in path:
+        assert finer[share].energy_RT == pytest.approx(ring.energy_RT, rel=1e-8)

@@ -237,7 +237,8 @@ def closed_ring_ensemble(
 ) -> ClosedRingEnsemble:
     """Thermal ensemble of the closed chain about a ring, by crankshafts and constrained moves.
 
-    Near a minimum of energy E the mean energy is about E + (3N - 6)/2 RT.
+    Near a minimum of energy E the mean energy is about E + (3N - 6)/2 RT; of a chain with guests,
+    N counts the steps that none of them holds.
 
     Parameters
     ----------
@@ -291,6 +292,7 @@ def closed_ring_ensemble(
     accepted = np.sum([r[2] for r in runs], axis=0)
     counts = np.sum([r[3] for r in runs], axis=0)
     strain = shapes - ground
+    strain[..., chain.bound, :] = 0.0  # round-off, times a stiffness without bound
     energies = 0.5 * np.einsum("ctsi,sij,ctsj->ct", strain, stiffness, strain)
     flat = shapes.reshape(-1, *ground.shape)
     centres = np.array(

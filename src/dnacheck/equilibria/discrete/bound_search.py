@@ -33,6 +33,7 @@ _STIFFENING = 10.0 ** np.arange(0.5, 4.1, 0.5)
 """What a guest's steps are stiffened by on the way to being held, where one step does not do."""
 _MOST_FURTHER_LINKS = 8
 _ROUGH = 1e-4
+_HALVINGS = 5
 # Minima are one when their energies agree to this relative precision and their angles (rad) to the
 # second; of a family of equal energy, whose register is free, one stands for all.
 _SAME_ENERGY = 1e-7
@@ -152,6 +153,52 @@ def _hold(
         elif not any(same_minimum(ring, other) for other in found.rings):
             found.rings.append(ring)
     found.rings.sort(key=lambda ring: ring.energy)
+
+
+def follow_binding(
+    chain: Chain, points: int = 17, newton: NewtonOptions | None = None
+) -> tuple[tuple[float, Equilibrium], ...]:
+    """The lowest ring of the free chain, followed while its guests bend the steps they hold.
+
+    Parameters
+    ----------
+    chain : Chain
+        With guests. At share 0 they hold their steps as those are unstressed, at 1 at the guests'
+        values: of a kink the share is that of its angle.
+    points : int
+        Shares from 0 to 1, evenly spaced; where Newton's method does not reach the next one, or
+        jumps to another link, smaller steps are taken.
+
+    Returns
+    -------
+    tuple of (share, Equilibrium)
+        Up to share 1, or up to where the branch ends. The free ring itself is not in it.
+    """
+    from dnacheck.equilibria.discrete.search import find_rings
+
+    newton = replace(newton or NewtonOptions(), minima_only=True)
+    free = find_rings(chain.elastic(0.0)).lowest
+    angles, link, reached = free.angles, free.link, -1.0
+    path: list[tuple[float, Equilibrium]] = []
+    step = 1.0 / max(1, points - 1)
+    for _ in range(points * 2**_HALVINGS):
+        share = 0.0 if reached < 0.0 else min(1.0, reached + step)
+        ring = solve_ring(_held_at(chain, share), angles, newton, throw=False)
+        if not _good(ring) or (ring.link != link and path):
+            step *= 0.5
+            if reached < 0.0 or step < 2.0**-_HALVINGS / points:
+                break
+            continue
+        angles, link, reached = ring.angles, ring.link, share
+        path.append((share, ring))
+        if share >= 1.0:
+            break
+    return tuple(path)
+
+
+def _held_at(chain: Chain, share: float) -> Chain:
+    """The chain with its guests holding their steps a share of the way to their values."""
+    return replace(chain, ground=chain.elastic(share).ground)
 
 
 def refuse_torn_guests(chain: Chain, boundary: AnyBoundary) -> None:

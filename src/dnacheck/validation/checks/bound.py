@@ -182,6 +182,52 @@ def stiffened(context: Context) -> Findings:
     return Findings(results)
 
 
+def kinking(context: Context) -> Findings:
+    """Free rings followed to bound ones as the guest bends its steps."""
+    from dnacheck.equilibria.discrete.bound_search import follow_binding
+    from dnacheck.equilibria.discrete.search import find_rings
+
+    results, lines = [], []
+    for molecule in context.molecules:
+        chain = bound_chain(context, molecule.name)
+        path = follow_binding(chain)
+        lines.append(
+            {
+                "name": molecule.name,
+                "x": [share for share, _ in path],
+                "y": [ring.energy_RT for _, ring in path],
+            }
+        )
+        share, end = path[-1]
+        if share < 1.0:  # the branch ends; the figure shows where
+            continue
+        known = [ring.energy_RT for ring in find_rings(chain)]
+        nearest = min(known, key=lambda energy: abs(energy - end.energy_RT))
+        results.append(
+            judge(
+                f"bound.kinking[{molecule.name}]",
+                "energy at the end of the branch from the free ring",
+                end.energy_RT,
+                nearest,
+                Rule.RELATIVE,
+                "a minimum that the search for bound rings found",
+                "both are converged to 1e-10",
+                1e-8,
+                "RT",
+            )
+        )
+    figure = Figure(
+        "bound-kinking",
+        "From the free ring to the bound one",
+        "named_lines",
+        {"lines": lines, "across": "share of the guest's bend", "up": "ring energy, RT"},
+        "The lowest free ring of each molecule, followed as the guest holds its steps and bends "
+        "them. A line that ends early loses its minimum there.",
+        height=4.6,
+    )
+    return Findings(results, [figure])
+
+
 def _table(context: Context, rows: Sequence[dict[str, Any]]) -> Table:
     from dnacheck.model.guests import guest_steps
 
@@ -284,5 +330,7 @@ GROUP = Group(
               Level.QUICK),
         Check("bound.stiffened", "bound rings are the limit of stiff ones", stiffened, 0.5,
               ("binding",), Level.QUICK),
+        Check("bound.kinking", "bound rings followed from free ones", kinking, 1.0, ("binding",),
+              Level.QUICK),
     ),
 )  # fmt: skip
