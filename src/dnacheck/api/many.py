@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -16,27 +17,33 @@ from dnacheck.numerics.outcome import InputError
 if TYPE_CHECKING:
     import pandas
 
+    from dnacheck.io.sequences import SequenceSource
     from dnacheck.validation.report.write import RunRecord
 
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """Lowest ring and Laplace J of many sequences.
+    """Lowest ring and J of many sequences or windows; the table is read when asked for.
 
     Attributes
     ----------
-    table : pandas.DataFrame
-        name, n_bp, link, energy_RT, energy_reduced, minus_lnJ, status, quality; in the order of
-        the input.
     rows, ok_rows : int
         All rows, and those whose status is ``ok``.
     seconds : float
+    path : Path or None
+        The output that holds the table; None if it is in memory alone.
     """
 
-    table: pandas.DataFrame
     rows: int
     ok_rows: int
     seconds: float
+    path: Path | None
+    _read: Callable[[], pandas.DataFrame] = field(repr=False)
+
+    @cached_property
+    def table(self) -> pandas.DataFrame:
+        """The rows in the order of the input; columns as ``dnacheck scan`` writes them."""
+        return self._read()
 
     def __len__(self) -> int:
         return self.rows
@@ -50,7 +57,8 @@ class Scan:
         return {str(key): list(values) for key, values in self.table.to_dict("list").items()}
 
     def __repr__(self) -> str:
-        return f"<scan of {self.rows} sequences, {self.ok_rows} ok>\n{self.table!r}"
+        where = f" in {self.path}" if self.path else ""
+        return f"<scan of {self.rows} rows, {self.ok_rows} ok{where}>"
 
     def _repr_html_(self) -> str:
         return str(self.table.to_html(max_rows=20))
@@ -60,23 +68,39 @@ def scan(
     source: str | os.PathLike[str],
     output: str | os.PathLike[str] | None = None,
     *,
+    window: int | None = None,
+    step: int = 1,
+    both_strands: bool = False,
+    region: str | None = None,
     restart: bool = False,
     threads: int | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
     progress: Progress = False,
     **parameters: Any,
 ) -> Scan:
-    """Lowest ring and Laplace J of every record of a FASTA or GenBank file.
+    """Lowest ring and J of every record, or of every window, of a FASTA or GenBank file.
 
     Parameters
     ----------
     source : path, or "-" for standard input
     output : path, optional
-        CSV file that is written as the scan goes; an unfinished one is gone on with.
+        Written as the scan goes, its form by its suffix (.csv, .parquet, .bedgraph, .bw, .html);
+        an unfinished one is gone on with.
+    window, step : int, optional
+        Scan the windows of so many base pairs, so far apart, instead of whole records.
+    both_strands : bool
+        Read each window from both strands.
+    region : str, optional
+        ``name:first-last``, base pairs from 1: windows inside it only.
     restart : bool
         Replace an existing output.
     threads : int, optional
+        Threads, or processes where windows are scanned.
+    workers, scheduler : int, str, optional
+        A local Dask cluster of so many workers, or the address of a running scheduler.
     progress : bool or callable
-        A callable is told the records done since its last call.
+        A callable is told the rows done since its last call.
     **parameters
         Of :func:`dnacheck.chain`: parameters, twist_ratio, a_tracts ...
 
@@ -98,12 +122,11 @@ def scan(
     >>> table = dc.scan("two.fasta").to_frame()
     >>> list(table["name"]), list(table["status"])[0]
     (['a', 'b'], 'ok')
+    >>> table = dc.scan("two.fasta", window=120, step=10).to_frame()
+    >>> [int(start) for start in table["start"]]
+    [0, 10, 20, 30, 0]
     """
-    import pandas
-
     from dnacheck.io.sequences import SequenceSource
-    from dnacheck.scanning.scan import ScanOptions
-    from dnacheck.scanning.scan import scan as run
 
     if not isinstance(source, (str, os.PathLike)):
         raise InputError(f"source must be a path or '-', not {source!r}")
@@ -112,19 +135,78 @@ def scan(
     chain("ACGTTGCATCA", **{key: value for key, value in parameters.items() if key != "a_tracts"})
     arguments = dict(parameters)
     arguments["angles"] = arguments.pop("parameters", "trifonov2")
-    options = ScanOptions(arguments, thread_count(threads))
+    path = None if output is None else Path(output)
+    if path is not None and not path.parent.is_dir():
+        raise InputError(
+            f"output '{path}': there is no folder '{path.parent}'; make it or name another"
+        )
+    from dnacheck.scanning.batch import Plan
+    from dnacheck.scanning.batch import run as run_plan
+    from dnacheck.scanning.pieces import Region, WindowOptions
+
+    plain = path is None or path.suffix.lower() == ".csv"
+    if window is None and plain and workers is None and scheduler is None:
+        if both_strands or region is not None or step != 1:
+            raise InputError("step, both_strands and region are of windows: give window")
+        return _scan_records(records, path, arguments, thread_count(threads), progress, restart)
+    options = None
+    if window is not None:
+        place = None if region is None else Region.parse(region)
+        options = WindowOptions(
+            whole("window", window, 1), whole("step", step, 0), both_strands, place
+        )
+    plan = Plan.of(records, arguments, options)
+    processes = 1 if threads is None else thread_count(threads)
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        told(progress, "rows", plan.rows if progress else None) as advance,
+    ):
+        target = Path(folder) / "scan.parquet" if path is None else path
+        done = run_plan(plan, [target], processes, workers, scheduler, advance, restart)
+        held = _table(target) if path is None else None
+    return Scan(
+        done.rows,
+        done.ok_rows,
+        done.seconds,
+        path,
+        lambda: _table(target) if held is None else held,
+    )
+
+
+def _scan_records(
+    records: SequenceSource,
+    path: Path | None,
+    arguments: dict[str, Any],
+    threads: int,
+    progress: Progress,
+    restart: bool,
+) -> Scan:
+    from dnacheck.scanning.scan import ScanOptions
+    from dnacheck.scanning.scan import scan as run
+
     with (
         tempfile.TemporaryDirectory() as folder,
         told(progress, "sequences", records.count if progress else None) as advance,
     ):
-        path = Path(folder) / "scan.csv" if output is None else Path(output)
-        if not path.parent.is_dir():
-            raise InputError(
-                f"output '{path}': there is no folder '{path.parent}'; make it or name another"
-            )
-        done = run(records, path, options, advance, restart)
-        table = pandas.read_csv(path)
-    return Scan(table, done.rows, done.ok_rows, done.seconds)
+        target = Path(folder) / "scan.csv" if path is None else path
+        done = run(records, target, ScanOptions(arguments, threads), advance, restart)
+        held = _table(target) if path is None else None
+    return Scan(
+        done.rows,
+        done.ok_rows,
+        done.seconds,
+        path,
+        lambda: _table(target) if held is None else held,
+    )
+
+
+def _table(path: Path) -> pandas.DataFrame:
+    import pandas
+
+    suffix = path.suffix.lower()
+    if suffix not in (".csv", ".parquet"):
+        raise InputError(f"output '{path}' is no table; scan to a .csv or .parquet to read it back")
+    return pandas.read_parquet(path) if suffix == ".parquet" else pandas.read_csv(path)
 
 
 def validate(
