@@ -74,6 +74,19 @@ def test_a_trajectory_that_turns_to_nan_exits_3_and_keeps_the_frames_before(caps
     assert "frame 3: the position of bead 315" in err
 
 
+def test_a_trajectory_cut_short_exits_3_and_says_how_many_frames_it_promised(capsys, files):
+    data = (files / "ring.dcd").read_bytes()
+    (files / "half.dcd").write_bytes(data[: len(data) // 2 + 40])
+    code, out, err = run(
+        capsys, "11T15", "--trajectory", str(files / "half.dcd"),
+        "--topology", str(files / "ring.pdb"), "--json",
+    )  # fmt: skip
+    held = json.loads(out)["frames"]
+    assert code == 3
+    assert 0 < held < 4
+    assert f"its header promises 4 frames, {held} are there" in err
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -15,7 +15,13 @@ from dnacheck.md.geometry import (
     planar_ring,
     step_angles,
 )
-from dnacheck.md.trajectory import bead_universe, open_trajectory, write_topology, write_trajectory
+from dnacheck.md.trajectory import (
+    bead_universe,
+    missing_frames,
+    open_trajectory,
+    write_topology,
+    write_trajectory,
+)
 from dnacheck.md.wedge_analysis import WedgeAngles
 from dnacheck.model.chain import Chain, build_chain, uniform_stiffness
 from dnacheck.model.molecules import embedded
@@ -176,3 +182,40 @@ def test_bad_files_are_named(files, tmp_path):
     with pytest.raises(InputError, match="cannot write"):
         write_trajectory(path / "nowhere" / "ring.dcd", chain, positions)
     assert not [p for p in path.iterdir() if p.name.startswith(".")]
+
+
+def test_frames_wrapped_into_a_box_are_refused(files):
+    """Positions taken modulo a box, as simulation programs write them; unwrapped they pass."""
+    chain, positions, path = files
+    box = 300.0
+    wrapped = positions.copy()
+    wrapped[2:] = np.mod(positions[2:] - positions.mean(), box)
+    assert np.abs(np.diff(wrapped[2, 0::2], axis=0)).max() > 100.0
+    write = {"whole": positions, "wrapped": wrapped}
+    for name, frames in write.items():
+        universe = bead_universe(chain)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            with MDAnalysis.Writer(str(path / f"{name}.dcd"), len(universe.atoms)) as writer:
+                for frame in frames:
+                    universe.atoms.positions = frame
+                    writer.write(universe.atoms)
+    for given in (chain, None):
+        whole = WedgeAngles(open_trajectory(path / "whole.dcd", path / "ring.pdb"), given).run()
+        assert len(whole.results.angles) == 5
+        analysis = WedgeAngles(open_trajectory(path / "wrapped.dcd", path / "ring.pdb"), given)
+        with pytest.raises(SolveError, match=r"frame 2: .* unwrap the trajectory"):
+            analysis.run()
+        assert len(analysis.results.angles) == 2
+
+
+def test_a_truncated_dcd_says_how_many_frames_it_promised(files):
+    chain, positions, path = files
+    write_trajectory(path / "ring.dcd", chain, positions)
+    data = (path / "ring.dcd").read_bytes()
+    (path / "half.dcd").write_bytes(data[: len(data) // 2])
+    for name, kept in (("ring", 5), ("half", 2)):
+        universe = open_trajectory(path / f"{name}.dcd", path / "ring.pdb")
+        assert len(universe.trajectory) == kept
+        assert missing_frames(path / f"{name}.dcd", kept) == 5 - kept
+    assert missing_frames(path / "ring.pdb", 1) == 0

@@ -44,6 +44,12 @@ EXIT_NOT_CONVERGED = 3
     help="Configurations kept of each replica.",
 )
 @click.option(
+    "--iterations",
+    type=Count(allowed.ITERATIONS),
+    default=None,
+    help="Of each minimisation, at most.  [default: 200, more beyond 200 bp]",
+)
+@click.option(
     "--replicas",
     type=Count(allowed.REPLICAS),
     default=2,
@@ -128,6 +134,7 @@ def command(
     target: str,
     ensemble: bool,
     samples: int,
+    iterations: int | None,
     replicas: int,
     integrator: str,
     step_fraction: float,
@@ -168,6 +175,7 @@ def command(
         raise InputError("--resume needs the --output directory of the run")
     from dnacheck.md.check import MdOptions
     from dnacheck.md.ensemble import EnsembleOptions
+    from dnacheck.md.minimise import MinimiseOptions
 
     dynamics = EnsembleOptions(
         samples=samples,
@@ -180,7 +188,14 @@ def command(
         platform=platform,
         seed=run.seed,
     )
-    options = MdOptions(ensemble=dynamics if ensemble else None, seed=run.seed, threads=run.threads)
+    options = MdOptions(
+        minimise=MinimiseOptions(
+            max_iterations=max(200, chain.n_steps) if iterations is None else iterations
+        ),
+        ensemble=dynamics if ensemble else None,
+        seed=run.seed,
+        threads=run.threads,
+    )
     return _check(chain, options, output, suffix, resume, run)
 
 

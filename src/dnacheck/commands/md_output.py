@@ -127,6 +127,17 @@ def _estimate(value: Estimate) -> dict[str, float]:
     }
 
 
+def _verdict(check: MdCheck) -> str:
+    if not check.passed:
+        return "A CHECK FAILED"
+    if not check.undecided:
+        return "every check passed"
+    return (
+        f"no check failed, but {check.undecided} of {len(check.findings)} are undecided: "
+        "more --samples decide them"
+    )
+
+
 def print_check(check: MdCheck) -> None:
     """The check as text; of its findings, those that did not pass."""
     click.echo(f"{check.chain.name}  {check.chain.n_steps} bp  OpenMM {check.platform}")
@@ -163,4 +174,4 @@ def print_check(check: MdCheck) -> None:
         kept = 0 if ensemble is None else len(ensemble.positions)
         click.echo(f"  STOPPED EARLY, with {kept} configurations kept: {check.trouble}")
     else:
-        click.echo(f"  {'every check passed' if check.passed else 'A CHECK FAILED'}")
+        click.echo(f"  {_verdict(check)}")

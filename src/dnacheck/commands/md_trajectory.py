@@ -27,7 +27,7 @@ def recover(
     run: RunSettings,
 ) -> int | None:
     """Recover frames and step angles of a trajectory; what came before a bad frame is kept."""
-    from dnacheck.md.trajectory import open_trajectory
+    from dnacheck.md.trajectory import missing_frames, open_trajectory
     from dnacheck.md.wedge_analysis import WedgeAngles
     from dnacheck.numerics.outcome import InputError, SolveError
 
@@ -42,6 +42,13 @@ def recover(
         analysis.run(start=start, stop=stop, step=step)
     except SolveError as error:
         trouble = str(error)
+    held = len(universe.trajectory)
+    missing = missing_frames(trajectory, held)
+    if missing and not trouble:
+        trouble = (
+            f"'{trajectory}' is cut short: its header promises {held + missing} frames, "
+            f"{held} are there; copy it again, or let its writer finish"
+        )
     results = analysis.results
     count = len(results.angles)
     record = {

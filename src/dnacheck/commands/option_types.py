@@ -32,9 +32,10 @@ POSITION = Range(0, 10**9)
 POINTS = Range(1, 10**6)
 TURNS = Range(-1000.0, 1000.0)
 SAMPLES = Range(20, 10**6)
+ITERATIONS = Range(1, 100_000)
 REPLICAS = Range(1, 1000)
 FRAMES = Range(-(2**31), 2**31 - 1)
-STEP_FRACTION = Range(1e-3, 1.0)
+STEP_FRACTION = Range(1e-3, 10.0)
 COMPUTED = Range(0, 100_000)
 
 _LONGEST_SHOWN = 30

@@ -112,6 +112,11 @@ class MdCheck:
     trouble: str
 
     @property
+    def undecided(self) -> int:
+        """How many findings are neither passed nor failed."""
+        return sum(finding.verdict == "inconclusive" for finding in self.findings)
+
+    @property
     def passed(self) -> bool:
         """Whether nothing failed and nothing stopped early."""
         failed = any(finding.verdict == "fail" for finding in self.findings)

@@ -308,7 +308,10 @@ def find_minima(
                 failed.append(minimum)
     if not found:
         raise SolveError(
-            f"none of {len(failed)} planar circles relaxed to a ring; raise max_iterations",
+            f"none of {len(failed)} planar circles of {chain.n_steps} bp relaxed to a ring in "
+            f"{options.max_iterations} iterations (largest force left "
+            f"{min(minimum.max_force for minimum in failed):.1e} RT/Å); allow more iterations, "
+            "which long chains need (dnacheck md --iterations)",
             tuple(failed),
         )
     return tuple(sorted(found, key=lambda m: m.energy_RT))

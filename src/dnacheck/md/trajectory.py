@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import secrets
+import struct
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -26,6 +27,7 @@ TRAJECTORY_SUFFIXES = (".dcd", ".xtc")
 # Decimals of a nanometre in XTC files, as many as the format can hold, found by reading back; its
 # usual three would give angles to 0.005 rad.
 _XTC_DECIMALS = (6, 5, 4, 3)
+_DCD_HEADER_BYTES = 84
 _SELF_CONTAINED = (".pdb", ".gro", ".ent")
 
 
@@ -200,6 +202,23 @@ def open_trajectory(trajectory: str | Path, topology: str | Path | None = None) 
         except Exception as error:  # readers of many formats raise what they like
             first = str(error).strip().splitlines()[0] if str(error).strip() else repr(error)
             raise InputError(f"cannot read {' with '.join(names)}: {first}") from error
+
+
+def missing_frames(trajectory: str | Path, frames: int) -> int:
+    """How many frames a DCD file promises in its header beyond those that it holds.
+
+    0 for other formats, which promise nothing, and where the header's number was never filled in.
+    """
+    path = Path(trajectory)
+    if path.suffix.lower() != ".dcd":
+        return 0
+    with path.open("rb") as stream:
+        head = stream.read(12)
+    if len(head) < 12:
+        return 0
+    order = "<i" if head[0] == _DCD_HEADER_BYTES else ">i"
+    promised: int = struct.unpack(order, head[8:12])[0]
+    return max(promised - frames, 0)
 
 
 @contextmanager

@@ -15,6 +15,9 @@ from dnacheck.numerics.outcome import InputError, SolveError
 
 Array = NDArray[np.float64]
 
+_LONGEST = 3.0
+"""Bonds and groove arms longer than so many times the usual are torn; thermal ones keep to 1.1."""
+
 
 class WedgeAngles(AnalysisBase):
     """Recover base-pair frames and step angles from a trajectory of beads.
@@ -48,8 +51,8 @@ class WedgeAngles(AnalysisBase):
     InputError
         The numbers of beads do not make a chain, or not this chain.
     SolveError
-        While running: a position is not a number or two beads coincide. Names the frame;
-        ``partial`` and :attr:`results` hold the frames before it.
+        While running: a position is not a number, two beads coincide, or the chain is torn.
+        Names the frame; ``partial`` and :attr:`results` hold the frames before it.
     """
 
     def __init__(
@@ -87,6 +90,7 @@ class WedgeAngles(AnalysisBase):
         bad = np.flatnonzero(~np.all(np.isfinite(self._positions), axis=1))
         if bad.size:
             self._stop(index, f"the position of bead {bad[0]} is not a number")
+        self._check_lengths(index)
         with np.errstate(invalid="ignore", divide="ignore"):
             centres, frames = frames_of_beads(self._positions, self.closed)
         if not np.all(np.isfinite(frames)):
@@ -95,6 +99,28 @@ class WedgeAngles(AnalysisBase):
         self.results.centres[index] = centres
         self.results.frames[index] = frames
         self.results.angles[index] = step_angles(frames, self._form)
+
+    def _check_lengths(self, index: int) -> None:
+        """Stop at a frame whose chain is torn, as wrapping into a periodic box tears it."""
+        centres, grooves = self._positions[0::2], self._positions[1::2]
+        after = np.roll(centres, -1, axis=0) if self.closed else centres[1:]
+        bonds = np.linalg.norm(after - centres[: len(after)], axis=1)
+        arms = np.linalg.norm(grooves - centres[: len(grooves)], axis=1)
+        rise = float(np.median(bonds)) if self.chain is None else self.chain.rise_A
+        for lengths, usual, what in (
+            (bonds, rise, "from base pair {} to the next it is {:.1f} Å, the rise is {:.1f} Å"),
+            (
+                arms,
+                float(np.median(arms)),
+                "base pair {}'s groove bead is {:.1f} Å off, not {:.1f}",
+            ),
+        ):
+            longest = int(np.argmax(lengths))
+            if lengths[longest] > _LONGEST * usual:
+                text = what.format(longest, lengths[longest], usual)
+                self._stop(
+                    index, f"{text}; unwrap the trajectory if it is wrapped into a periodic box"
+                )
 
     def _conclude(self) -> None:
         if self.chain is not None:
