@@ -202,6 +202,7 @@ def corrected_laplace(
         minus_lnJ=-(profile.log_j + term.value),
         stderr=term.stderr,
         links=profile.shares({chart.link: chart.log_j + term.value for chart in profile.charts}),
+        bias_bound=bias,
         samples=2 * term.pairs,
         seconds=time.perf_counter() - began,
         warnings=tuple(warnings),

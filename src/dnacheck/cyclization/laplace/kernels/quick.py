@@ -167,19 +167,55 @@ def _keep(chart: _Chart, count: int, place: Any, work: Any, constant: float) -> 
 
 
 @njit(cache=True, nogil=True)
+def _predict(chart: _Chart, place: Any, shift: float, extrapolate: bool, q: Any, m: Any) -> None:
+    """A molecule rolled by ``shift`` radians from slice ``place[0]``, into ``q`` and ``m``.
+
+    Rolling multiplies the bends -theta + i phi with exp(i shift) and turns force and moment about
+    the axis of the first base pair; what is left, the molecule's own bends, is extrapolated from
+    slice ``place[1]``, rolled here.
+    """
+    here, before = place
+    c, sn = math.cos(shift), math.sin(shift)
+    ahead, back_c, back_s = 0.0, 1.0, 0.0
+    if extrapolate and before >= 0:
+        gap = chart.registers[here] - chart.registers[before]
+        ahead, back_c, back_s = shift / gap, math.cos(gap), math.sin(gap)
+    for s in range(q.shape[0]):
+        x, y = -chart.angles[here, s, 1], chart.angles[here, s, 2]
+        q[s, 0] = chart.angles[here, s, 0]
+        if ahead != 0.0:
+            u, v = -chart.angles[before, s, 1], chart.angles[before, s, 2]
+            q[s, 0] += ahead * (q[s, 0] - chart.angles[before, s, 0])
+            x, y = (
+                x + ahead * (x - (back_c * u - back_s * v)),
+                y + ahead * (y - (back_s * u + back_c * v)),
+            )
+        q[s, 1], q[s, 2] = -(c * x - sn * y), sn * x + c * y
+    for i in (0, 3):
+        x, y = chart.multipliers[here, i], chart.multipliers[here, i + 1]
+        m[i + 2] = chart.multipliers[here, i + 2]
+        if ahead != 0.0:
+            u, v = chart.multipliers[before, i], chart.multipliers[before, i + 1]
+            m[i + 2] += ahead * (m[i + 2] - chart.multipliers[before, i + 2])
+            x, y = (
+                x + ahead * (x - (back_c * u - back_s * v)),
+                y + ahead * (y - (back_s * u + back_c * v)),
+            )
+        m[i], m[i + 1] = c * x - sn * y, sn * x + c * y
+    m[6] = chart.multipliers[here, 6]
+    if ahead != 0.0:
+        m[6] += ahead * (m[6] - chart.multipliers[before, 6])
+
+
+@njit(cache=True, nogil=True)
 def _moved(
     steps: Any, problem: RegisterProblem, chart: _Chart, place: Any, shift: float, work: Any
 ) -> bool:
     """The minimum ``shift`` radians from slice ``place[0]``, extrapolated from ``place[1]``."""
     q, m, figure, factors = work
-    here, before = place
+    here = place[0]
     for pieces in range(1, _SUBDIVISIONS + 1):
-        q[:] = chart.angles[here]
-        m[:] = chart.multipliers[here]
-        if before >= 0 and pieces == 1:
-            ahead = shift / (chart.registers[here] - chart.registers[before])
-            q += ahead * (chart.angles[here] - chart.angles[before])
-            m += ahead * (chart.multipliers[here] - chart.multipliers[before])
+        _predict(chart, place, shift / pieces if pieces > 1 else shift, pieces == 1, q, m)
         reached = True
         for piece in range(pieces):
             at = chart.registers[here] + shift * (piece + 1) / pieces
