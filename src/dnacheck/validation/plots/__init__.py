@@ -11,7 +11,15 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from dnacheck.validation.plots import bead_chain, binding, continuation, curves, rod, shapes
+from dnacheck.validation.plots import (
+    bead_chain,
+    binding,
+    continuation,
+    curves,
+    mechanics,
+    rod,
+    shapes,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,6 +45,7 @@ KINDS: dict[str, tuple[Panel, ...]] = {
     "work_precision": (curves.work_precision,),
     "named_lines": (curves.named_lines,),
     "binding": (binding.free_to_bound,),
+    "fitted": (mechanics.fitted,),
     "fluctuation": (bead_chain.fluctuation,),
     "bead_ring": (bead_chain.ring_from_above, bead_chain.ring_from_the_side),
     "sweep_energy": (_sweep("energy"),),

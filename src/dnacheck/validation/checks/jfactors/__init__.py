@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dnacheck.validation.checks.jfactors.acceptance import acceptance, measure
+from dnacheck.validation.checks.jfactors.fitted import fitted
 from dnacheck.validation.checks.jfactors.methods import laplace, pairwise
 from dnacheck.validation.checks.jfactors.straight import only_homopolymers, straight
 from dnacheck.validation.checks.jfactors.table3 import shifts, table3
@@ -94,6 +95,8 @@ GROUP = Group(
               requires=("dnacheck.validation.reference.table3",)),
         Check("jfactor.shifts", "entropy shifts (Figures 17 to 19)", shifts, 5.0, _NEEDS,
               applies=_paper, requires=("dnacheck.validation.reference.table3",)),
+        Check("jfactor.fitted", "Table III with fitted mechanics", fitted, 12.0, _NEEDS,
+              applies=_paper, requires=("dnacheck.mechanics.fit",)),
         Check("jfactor.straight", "straight molecules beside the rod", straight, 110.0, _NEEDS,
               applies=only_homopolymers, requires=("dnacheck.cyclization.laplace.anharmonic",)),
         Check("jfactor.speed", "error against time", speed, 25.0, _NEEDS, applies=_paper,
