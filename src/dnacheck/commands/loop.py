@@ -15,6 +15,7 @@ from dnacheck.commands.common import (
     model_options,
     target_argument,
 )
+from dnacheck.commands.option_types import integer, shown
 from dnacheck.commands.output import note, print_json, progress
 
 if TYPE_CHECKING:
@@ -34,10 +35,10 @@ class Sites(click.ParamType):
         if isinstance(value, tuple):
             return value
         parts = str(value).split(",")
-        try:
-            first, last = (int(part) for part in parts)
-        except ValueError:
-            self.fail(f"'{value}' is not two base pairs such as 10,102", param, ctx)
+        numbers = [number for part in parts if (number := integer(part)) is not None]
+        if not len(numbers) == len(parts) == 2:
+            self.fail(f"{shown(value)} is not two base pairs such as 10,102", param, ctx)
+        first, last = numbers
         return first, last
 
 

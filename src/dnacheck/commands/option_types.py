@@ -35,6 +35,9 @@ SAMPLES = Range(20, 10**6)
 ITERATIONS = Range(1, 100_000)
 REPLICAS = Range(1, 1000)
 FRAMES = Range(-(2**31), 2**31 - 1)
+FORCE_PN = Range(-1000.0, 1000.0, "pN")
+TORQUE_PN_NM = Range(-1000.0, 1000.0, "pN nm")
+"""Single molecules break below 1000 pN."""
 STEP_FRACTION = Range(1e-3, 10.0)
 COMPUTED = Range(0, 100_000)
 

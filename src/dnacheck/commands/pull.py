@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 import dnacheck as dc
+from dnacheck.commands import option_types as allowed
 from dnacheck.commands.common import (
     ModelSettings,
     RunSettings,
@@ -16,6 +17,7 @@ from dnacheck.commands.common import (
     model_options,
     target_argument,
 )
+from dnacheck.commands.option_types import Number
 from dnacheck.commands.output import note, print_json
 
 
@@ -24,14 +26,14 @@ from dnacheck.commands.output import note, print_json
 @click.option(
     "--force-pN",
     "force",
-    type=float,
+    type=Number(allowed.FORCE_PN),
     required=True,
     help="Along the axis of the first base pair; negative pushes.",
 )
 @click.option(
     "--torque-pN-nm",
     "torque",
-    type=float,
+    type=Number(allowed.TORQUE_PN_NM),
     default=0.0,
     show_default=True,
     help="On the end, about the same axis; positive overwinds.",
