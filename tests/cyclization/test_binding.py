@@ -13,6 +13,8 @@ from dnacheck.cyclization.half_chain.method import HalfChain
 from dnacheck.cyclization.laplace.isolated import laplace
 from dnacheck.cyclization.laplace.method import Laplace
 from dnacheck.cyclization.method import Run
+from dnacheck.equilibria.boundary import HingedRing, NickedRing
+from dnacheck.equilibria.discrete.boundary_search import find_equilibria
 from dnacheck.equilibria.discrete.search import find_rings
 from dnacheck.equilibria.discrete.solve import solve_ring
 from dnacheck.model.chain import build_chain
@@ -123,3 +125,25 @@ def test_thermal_motion_of_a_bound_ring_by_two_kinds_of_moves():
     assert abs(second.mean - harmonic) < 4.0 * second.stderr + 0.03 * harmonic
     # Negative control: the held steps' angles do not count.
     assert abs(second.mean - harmonic - 4.5) > 4.0 * second.stderr
+
+
+@pytest.mark.parametrize("ends", [NickedRing(), HingedRing()])
+def test_j_of_open_ends_with_a_guest_is_the_limit_of_stiff_steps(bound, ends):
+    elastic = bound.elastic()
+    stiffness = elastic.stiffness.copy()
+    stiffness[bound.bound] *= 1e5
+    held = find_equilibria(bound, ends)
+    stiff = find_equilibria(replace(elastic, stiffness=stiffness), ends)
+    assert held.boundary == ends
+    for method in (Laplace(), Laplace(register=True)):
+        limit = method.compute(stiff).minus_lnJ
+        assert method.compute(held).minus_lnJ == pytest.approx(limit, abs=1e-4)
+    # Negative control: it is not the closed ring's.
+    closed = Laplace(register=True).compute(bound).minus_lnJ
+    assert abs(Laplace(register=True).compute(held).minus_lnJ - closed) > 0.05
+
+
+def test_linkage_of_open_ends_compares_open_ends(bound):
+    linkage = binding(bound, Laplace(), boundary=NickedRing())
+    free = laplace(find_equilibria(bound.elastic(0.0), NickedRing())).minus_lnJ
+    assert linkage.free.minus_lnJ == pytest.approx(free)

@@ -114,11 +114,13 @@ def command(
             return result, None
         from dnacheck.cyclization.binding import binding
         from dnacheck.cyclization.method import Run
+        from dnacheck.equilibria.boundary import ENDS
         from dnacheck.equilibria.discrete.search import SearchOptions
 
         rest = max(left - (time.perf_counter() - searching), 1e-3)
         asked = Run(run.seed, run.threads, None, tolerance, rest)
-        return result, binding(chain, way, asked, SearchOptions(links=link), result)
+        options = SearchOptions(links=link)
+        return result, binding(chain, way, asked, options, result, ENDS[ends])
 
     for molecule in molecules:
         if isinstance(molecule, InputError):

@@ -13,8 +13,10 @@ from typing import Any
 
 from dnacheck.cyclization.method import DEFAULT_TOLERANCE, Method, Run
 from dnacheck.cyclization.result import JFactor
-from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
-from dnacheck.equilibria.ring import Equilibrium
+from dnacheck.equilibria.boundary import AnyBoundary
+from dnacheck.equilibria.discrete.boundary_search import find_equilibria
+from dnacheck.equilibria.discrete.search import SearchOptions
+from dnacheck.equilibria.ring import RING, Equilibrium
 from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import InputError
 from dnacheck.numerics.seeds import seed_sequence
@@ -99,6 +101,7 @@ def binding(
     run: Run | None = None,
     options: SearchOptions | None = None,
     bound: JFactor | None = None,
+    boundary: AnyBoundary = RING,
 ) -> Binding:
     """J of a chain with its guests and without, and the ratio of binding constants.
 
@@ -110,6 +113,8 @@ def binding(
         With a link, both J are the parts of that link.
     bound : JFactor, optional
         Of the chain as it is, where that is known already.
+    boundary : Ring, NickedRing, HingedRing or Loop
+        How the closed molecule's ends meet, bound and free.
 
     Raises
     ------
@@ -123,11 +128,11 @@ def binding(
     run = run or Run(tolerance=DEFAULT_TOLERANCE)
     bare = chain.elastic(0.0)
     ours, theirs = seed_sequence(run.rng).spawn(2)
-    rings = find_rings(chain, options)
+    rings = find_equilibria(chain, boundary, options)
     if bound is None:
         bound = method.compute(rings, rng=ours, threads=run.threads, tolerance=run.tolerance,
                                max_seconds=run.max_seconds)  # fmt: skip
-    others = find_rings(bare, options)
+    others = find_equilibria(bare, boundary, options)
     free = method.compute(others, rng=theirs, threads=run.threads, tolerance=run.tolerance,
                           max_seconds=run.max_seconds)  # fmt: skip
     if options is not None and isinstance(options.links, int):

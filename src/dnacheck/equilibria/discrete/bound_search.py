@@ -91,7 +91,7 @@ def hold_rings(
             _hold_searched(chain, more, RING, newton, found)
     if isinstance(options.links, int):
         found.rings = [ring for ring in found.rings if ring.link == options.links]
-    return _collected(chain, found, began)
+    return _collected(chain, RING, found, began)
 
 
 def hold_found(
@@ -101,10 +101,10 @@ def hold_found(
     began = time.perf_counter() - soft.seconds
     found = _Found()
     _hold_searched(chain, soft, boundary, replace(newton, minima_only=True), found)
-    return _collected(chain, found, began)
+    return _collected(chain, boundary, found, began)
 
 
-def _collected(chain: Chain, found: _Found, began: float) -> Equilibria:
+def _collected(chain: Chain, boundary: AnyBoundary, found: _Found, began: float) -> Equilibria:
     notes = tuple(found.notes)
     if not found.rings and not notes and found.links:
         notes = (
@@ -121,6 +121,7 @@ def _collected(chain: Chain, found: _Found, began: float) -> Equilibria:
         seconds=time.perf_counter() - began,
         status=Status.CONVERGED if found.rings else Status.NOT_FOUND,
         notes=notes,
+        boundary=boundary,
     )
 
 
