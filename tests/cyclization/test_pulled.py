@@ -124,7 +124,7 @@ def test_command_prints_and_gives_json(capsys):
     [
         (["--force-pN", "1", "--torque-pN-nm", "-300"], "no stable shape"),
         (["--force-pN", "0.5", "--torque-pN-nm", "200"], "no stable shape"),
-        (["--force-pN", "nan"], "finite"),
+        (["--force-pN", "nan"], "give a number"),
     ],
 )
 def test_a_pull_without_a_minimum_is_one_line_and_exit_code_2(capsys, arguments, words):
@@ -134,6 +134,14 @@ def test_a_pull_without_a_minimum_is_one_line_and_exit_code_2(capsys, arguments,
     assert captured.out == ""
     assert words in captured.err
     assert len(captured.err.strip().splitlines()) == 1
+
+
+def test_a_torque_that_winds_the_chain_up_is_said(capsys):
+    assert cli.main(["pull", "11T15", "--force-pN", "1", "--torque-pN-nm", "5"]) == 0
+    assert "does not last" in capsys.readouterr().err
+    # Negative control: at ten times the force the same torque turns the stretched chain.
+    assert cli.main(["pull", "11T15", "--force-pN", "10", "--torque-pN-nm", "5"]) == 0
+    assert "does not last" not in capsys.readouterr().err
 
 
 def test_too_few_chains_are_refused():

@@ -79,7 +79,13 @@ def command(
     if chain.rigid:
         warnings.append("thermal average: left out, for steps of six parameters have none yet")
     else:
-        record["thermal"] = asdict(pulled_mean(chain, boundary, rng=run.seed))
+        mean = pulled_mean(chain, boundary, rng=run.seed)
+        record["thermal"] = asdict(mean)
+        if mean.winds_up(chain, boundary):
+            warnings.append(
+                "chains wind back over their start, where the turn of an end has no bound: under "
+                "this torque the stretched shape does not last; pull harder or twist less"
+            )
         if force >= 0.0:
             length = chain.n_steps * chain.rise_A
             # What bends of random phase leave of it is the sequence's own affair.

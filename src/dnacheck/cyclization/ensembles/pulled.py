@@ -55,6 +55,18 @@ class PulledMean:
     chains: int
     seconds: float
 
+    def winds_up(self, chain: Chain, pull: Pull) -> bool:
+        """Whether the end turned much further than the twist of the steps explains.
+
+        A chain that folds back gains two turns each time its tangent passes over the axis, so that
+        a torque wins over any force in the end. Where that is not slow, the mean is that of no
+        lasting state: by more than one turn, and half, beyond what the steps yield by themselves.
+        """
+        softness = float(chain.flexibility[:, 0, 0].sum()) / chain.energy_scale_RT
+        torque = pull.torque_pN_nm / thermal_energy_pN_nm(pull.temperature_K)
+        yielded = torque * softness / (2.0 * math.pi)
+        return torque != 0.0 and abs(self.excess_turns - yielded) > 1.0 + 0.5 * abs(yielded)
+
 
 def pulled_mean(
     chain: Chain, pull: Pull, populations: int = 16, chains: int = 1000, rng: Randomness = 0

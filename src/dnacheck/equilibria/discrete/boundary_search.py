@@ -1,8 +1,8 @@
 """Search for the equilibria of chains under any boundary: where each search starts.
 
 A nicked ring starts from planar circles without excess twist, in the registers where the planar
-ring is predicted to rest. A hinged ring starts from the nicked ones, released, and from circles
-rolled by quarter turns. A loop starts from the unstressed shape, as it is and turned
+ring is predicted to rest. A hinged ring starts from the nicked ones, released, and from the
+circle rolled over. A loop starts from the unstressed shape, as it is and turned
 evenly until its end faces as the target, and from the rings; the end is led to the target's pose in
 as many steps as it needs. A pulled chain starts from its unstressed
 shape.
@@ -33,6 +33,9 @@ Array = NDArray[np.float64]
 _SAME_ENERGY = 1e-7
 _SAME_ANGLES = 1e-4
 _ALL_REGISTERS = 8
+# What the predicted energy of a planar ring may lack of a second minimum for one to be looked for,
+# relative to a circle's; measured for rings in the compiled search.
+_LACKING = 0.005
 _MOST_PIECES = 64
 """Into how many the way to a target's pose is divided at most."""
 
@@ -119,13 +122,19 @@ def _solutions(
     # The link only sets the excess twist: none, where the end is free to turn.
     registers = np.empty(3)
     turns = np.empty((2, chain.n_steps + 1, 3))
-    count, _, _ = predicted_registers(chain.arrays, chain.relaxed_turns, registers, turns)
-    chosen = [registers[0], registers[1] if count == 2 else registers[0] + math.pi]
+    count, lacking, _ = predicted_registers(chain.arrays, chain.relaxed_turns, registers, turns)
+    chosen = [registers[0]]
+    if count == 2:
+        chosen.append(registers[1])
+    elif lacking < _LACKING or chain.rigid or everything:
+        chosen.append(registers[0] + math.pi)
     if isinstance(boundary, HingedRing):
         for ring in _solutions(chain, NickedRing(), everything, newton):
             if ring is not None and ring.status.ok and ring.stable is not False:
                 yield solve_ring(chain, ring.angles, newton, boundary=boundary, throw=False)
-        chosen = [registers[0] + 0.5 * math.pi * k for k in range(4)]
+        # The released ring may turn over: from half a turn away, and with all from quarters.
+        turned = (0.0, 0.5, 1.0, 1.5) if everything else (1.0,)
+        chosen = [registers[0] + math.pi * share for share in turned]
     if everything:
         chosen += [
             registers[0] + 2.0 * math.pi * (k + 0.5) / _ALL_REGISTERS for k in range(_ALL_REGISTERS)
