@@ -41,7 +41,7 @@ def dense_parts(chain, ring):
     form = chain.step_form
     c, s = math.cos(ring.register), math.sin(ring.register)
     along, across = np.empty_like(ring.angles), np.empty_like(ring.angles)
-    rk.register_functionals(chain.ground, chain.form_code, 1, along, across)
+    rk.register_rows(chain.arrays, 1.0, along, across)
     g = np.vstack([jacobian(ring.angles, form), ring.factors.rows[6]])
     hessian = chain.energy_scale_RT * block_diagonal(chain.stiffness)
     hessian = hessian + closure_hessian(ring.angles, ring.multipliers[:6], form)
@@ -52,7 +52,7 @@ def dense_parts(chain, ring):
 def test_it_is_closed_stationary_and_at_its_register(held):
     chain, link, ring = held
     along, across = np.empty_like(ring.angles), np.empty_like(ring.angles)
-    rk.register_functionals(chain.ground, chain.form_code, link, along, across)
+    rk.register_rows(chain.arrays, float(link), along, across)
     register, extent = rk.register_of(ring.angles, along, across)
     assert math.cos(register - ring.register) == pytest.approx(1.0, abs=1e-10)
     assert extent == pytest.approx(ring.extent, rel=1e-10)
@@ -103,7 +103,7 @@ def test_draws_have_the_covariance_of_the_projected_hessian(held):
     for i in range(n):
         normals, x = np.zeros((n // 3, 3)), np.empty((n // 3, 3))
         normals.ravel()[i] = 1.0
-        draw_slice(ring.factors.right, ring.factors.z, ring.factors.root, normals, x)
+        draw_slice(chain.arrays, ring.factors, normals, x)
         open_by = ring.factors.rows @ x.ravel()
         columns.append(x.ravel() - open_by @ ring.factors.projector)
         quadratic = 1.0 - open_by @ ring.factors.schur @ open_by

@@ -35,15 +35,9 @@ CLOSURE_SAMPLING = {"09T15": (15.531, 0.010), "08T15": (15.762, 0.011)}
 def drawn_poses(chain: Chain, angles: np.ndarray, backward: bool) -> np.ndarray:
     n = angles.shape[1]
     poses = np.empty((len(angles), 7))
-    half_poses(
-        angles - chain.ground[:n],
-        np.tile(np.eye(3), (n, 1, 1)),
-        chain.ground[:n],
-        chain.ground[:n],
-        0,
-        backward,
-        poses,
-    )
+    ground, roots = np.array(chain.ground[:n]), np.tile(np.eye(3), (n, 1, 1))
+    steps = chain.arrays._replace(ground=ground, stiffness=np.array(chain.stiffness[:n]))
+    half_poses(steps, angles - ground, roots, ground, backward, poses)
     return poses
 
 

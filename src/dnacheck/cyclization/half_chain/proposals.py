@@ -18,13 +18,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dnacheck.equilibria.discrete.kernels.closure import (
-    closure_jacobian,
-    closure_residual,
-    energy_gradient,
-    linearise,
+from dnacheck.equilibria.boundary_kernels import ring_boundary
+from dnacheck.equilibria.discrete.kernels.states import (
+    evaluate,
+    factorise_state,
+    jacobian,
+    new_factors,
+    new_state,
 )
-from dnacheck.equilibria.discrete.kernels.factorisation import FACTOR_WIDTH, factorise
 from dnacheck.equilibria.discrete.spectrum import ProjectedInverse
 from dnacheck.equilibria.ring import Equilibria
 from dnacheck.model.chain import Chain
@@ -61,7 +62,7 @@ class Linearisation:
 
     Attributes
     ----------
-    jacobian : ndarray, shape (6, 3N)
+    jacobian : ndarray, shape (6, cN)
         End displacement (steps) and rotation (radians) per radian of each angle.
     spread : ndarray, shape (6, 6)
         G K^-1 G^T in RT: covariance of the mismatch of chains drawn about these angles.
@@ -83,9 +84,9 @@ class Tilt:
 
     Attributes
     ----------
-    angles : ndarray, shape (N, 3)
+    angles : ndarray, shape (N, c)
         Closed shape q* in radians.
-    pull : ndarray, shape (N, 3)
+    pull : ndarray, shape (N, c)
         g = K (q* - q^) in RT per radian.
     energy_RT : float
     link : int
@@ -117,30 +118,33 @@ def rolled(chain: Chain, angles: Array, joint: int) -> tuple[Array, Array, Array
 
 
 def linearised_closure(chain: Chain, angles: Array, joint: int = 0) -> Linearisation:
-    """Closure, multipliers and curvature of a closed shape (N, 3), cut at base pair ``joint``."""
+    """Closure, multipliers and curvature of a closed shape (N, c), cut at base pair ``joint``."""
     q, ground, stiffness = rolled(chain, angles, joint)
-    n = chain.n_steps
-    form = chain.form_code
-    centres, frames = np.empty((n + 1, 3)), np.empty((n + 1, 3, 3))
-    axes, gradient = np.empty((n, 3, 3)), np.empty((n, 3))
-    halves = np.empty((n if form else 0, 5, 3))
-    linearise(q, form, centres, frames, axes, halves)
-    energy_gradient(q, ground, stiffness, gradient)
-    jacobian = np.empty((6, 3 * n))
-    closure_jacobian(centres, axes, jacobian)
-    flexibility = np.linalg.inv(stiffness)
-    weighted = np.einsum("sij,csj->csi", flexibility, jacobian.reshape(6, n, 3)).reshape(6, -1)
-    spread = weighted @ jacobian.T
-    multipliers = -np.linalg.solve(spread, weighted @ gradient.ravel())
-    factors, small = np.empty((n, FACTOR_WIDTH)), np.empty((6, 7))
-    factorise(gradient, stiffness, 0.0, form, centres, axes, halves, multipliers, factors, small)
+    steps = chain.arrays._replace(ground=ground, stiffness=stiffness)
+    state = new_state(steps, ring_boundary())
+    state.angles[:] = q
+    evaluate(state, steps)
+    rows = np.empty((6, q.size))
+    jacobian(state, rows)
+    weighted = _flexible(np.asarray(np.linalg.inv(stiffness), dtype=float), rows)
+    spread = weighted @ rows.T
+    multipliers = -np.linalg.solve(spread, weighted @ state.gradient.ravel())
+    factors, small = new_factors(steps), np.empty((6, 7))
+    factorise_state(state, steps, 0.0, multipliers, factors, small, state.gradient)
     scale = chain.energy_scale_RT
     return Linearisation(
-        jacobian=jacobian,
+        jacobian=rows,
         spread=spread / scale,
         multipliers=scale * multipliers,
         curvature=_bounded_curvature(small[:, :6] / scale, spread / scale),
     )
+
+
+def _flexible(flexibility: Array, rows: Array) -> Array:
+    """K^-1 times the rows (6, cN) of a Jacobian."""
+    n, c = flexibility.shape[:2]
+    turned: Array = np.einsum("sij,rsj->rsi", flexibility, rows.reshape(6, n, c)).reshape(6, -1)
+    return turned
 
 
 def _bounded_curvature(flexibility: Array, spread: Array) -> Array:
@@ -156,29 +160,28 @@ def _bounded_curvature(flexibility: Array, spread: Array) -> Array:
 
 
 def _energy_RT(chain: Chain, angles: Array) -> tuple[float, Array]:
-    gradient = np.empty_like(chain.ground)
-    energy = energy_gradient(angles, chain.ground, chain.stiffness, gradient)
-    return chain.energy_scale_RT * energy, chain.energy_scale_RT * gradient
+    strain = angles - chain.ground
+    pull = chain.energy_scale_RT * np.einsum("sij,sj->si", chain.stiffness, strain)
+    return 0.5 * float(np.sum(pull * strain)), pull
 
 
 def close_chain(chain: Chain, angles: Array) -> Array | None:
     """The nearest closed shape in the norm of the stiffness, to first order; None if not found."""
-    n, form = chain.n_steps, chain.form_code
-    q = np.array(angles, dtype=float)
-    centres, frames = np.empty((n + 1, 3)), np.empty((n + 1, 3, 3))
-    axes, halves = np.empty((n, 3, 3)), np.empty((n if form else 0, 5, 3))
-    jacobian, residual = np.empty((6, 3 * n)), np.empty(6)
-    flexibility = np.linalg.inv(chain.stiffness)
+    steps = chain.arrays
+    state = new_state(steps, ring_boundary())
+    state.angles[:] = angles
+    rows = np.empty((6, angles.size))
+    flexibility = np.asarray(np.linalg.inv(chain.stiffness), dtype=float)
     for _ in range(_PROJECTIONS):
-        linearise(q, form, centres, frames, axes, halves)
-        closure_residual(centres, frames, residual)
-        if not np.isfinite(residual).all():
+        evaluate(state, steps)
+        if not np.isfinite(state.closure).all():
             return None
-        if np.abs(residual).max() < _CLOSED * n:
-            return q
-        closure_jacobian(centres, axes, jacobian)
-        weighted = np.einsum("sij,csj->csi", flexibility, jacobian.reshape(6, n, 3)).reshape(6, -1)
-        q -= (np.linalg.solve(weighted @ jacobian.T, residual) @ weighted).reshape(n, 3)
+        if np.abs(state.closure).max() < _CLOSED * chain.n_steps:
+            return state.angles
+        jacobian(state, rows)
+        weighted = _flexible(flexibility, rows)
+        change = np.linalg.solve(weighted @ rows.T, state.closure) @ weighted
+        state.angles[:] -= change.reshape(angles.shape)
     return None
 
 
@@ -187,7 +190,7 @@ def softest_direction(
 ) -> tuple[Array, float]:
     """Softest closed change of shape in the norm of K, and its Hessian over stiffness.
 
-    The direction (N, 3) has unit length in that norm (RT): one standard deviation of the free
+    The direction (N, c) has unit length in that norm (RT): one standard deviation of the free
     Gaussian. Power iteration on the projected inverse Hessian; ``multipliers`` are reduced.
     """
     inverse = ProjectedInverse(chain, angles, multipliers)
@@ -228,7 +231,7 @@ def _walk(chain: Chain, start: Array, direction: Array, ceiling: float, known: l
 
 
 def centre_shapes(search: Equilibria) -> list[tuple[Array, Array, int]]:
-    """Angles (N, 3), reduced multipliers (6,) and link of the shapes that sampling starts from.
+    """Angles (N, c), reduced multipliers (6,) and link of the shapes that sampling starts from.
 
     They are the minima of the search, and the one ring of a family with a free register that it
     found; a tilt need not be an isolated minimum.

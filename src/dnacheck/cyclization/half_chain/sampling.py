@@ -128,7 +128,9 @@ class HalfSampler:
         self.shares = np.array([tilt.share for tilt in tilts])
         self.tilted = tilted
         self.backward = steps.start != 0
-        self.form = chain.form_code
+        self.steps = chain.arrays._replace(
+            ground=self.ground, stiffness=np.ascontiguousarray(chain.stiffness[steps])
+        )
 
     def counts(self, total: int) -> NDArray[np.int64]:
         """Draws of each component: its share by largest remainder, but one at least."""
@@ -155,9 +157,7 @@ class HalfSampler:
             while done < last:
                 part = slice(done, min(done + most, last))
                 strains = rng.standard_normal((part.stop - done, n, d))
-                half_poses(
-                    strains, self.roots, centre, self.ground, self.form, self.backward, poses[part]
-                )
+                half_poses(self.steps, strains, self.roots, centre, self.backward, poses[part])
                 scores[part] = strains.reshape(-1, n * d) @ pulls - self.energies
                 done = part.stop
         if self.tilted:

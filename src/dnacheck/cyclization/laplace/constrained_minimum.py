@@ -15,13 +15,14 @@ from dnacheck.equilibria.boundary import AnyBoundary
 from dnacheck.equilibria.ring import RING
 from dnacheck.model.chain import Chain
 from dnacheck.model.chain_kernels import HingeSteps
+from dnacheck.model.rigid_kernels import RigidSteps
 from dnacheck.numerics.outcome import InputError
 
 Array = NDArray[np.float64]
 
 _SUBDIVISIONS = 5
 _JUMP = 0.5
-"""Change of an angle (radians) between neighbours that means another branch was reached."""
+"""Change of a coordinate (radians, lengths) between neighbours that means another branch."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ class ConstrainedMinimum:
         Number of the register on the circle's grid.
     register : float
         In radians.
-    angles : ndarray, shape (N, 3)
+    angles : ndarray, shape (N, c)
     multipliers : ndarray, shape (7,)
         Force, moment and register multiplier.
     energy : float
@@ -86,7 +87,7 @@ class ConstrainedMinimum:
         |S|.
     log_density : float
         ln of J(psi), mol/L per radian, by Laplace's approximation.
-    direction : ndarray, shape (N, 3)
+    direction : ndarray, shape (N, c)
         Row whose product with the angles is |S| on this slice.
     factors : SliceFactors
         The Gaussian of its neighbours.
@@ -104,10 +105,10 @@ class ConstrainedMinimum:
     factors: SliceFactors
 
 
-def steps_in_RT(chain: Chain) -> HingeSteps:
+def steps_in_RT(chain: Chain) -> HingeSteps | RigidSteps:
     """The chain's steps as compiled kernels read them, their stiffness in RT."""
     stiffness = np.ascontiguousarray(chain.energy_scale_RT * chain.stiffness)
-    return HingeSteps(chain.arrays.ground, stiffness, chain.form_code)
+    return chain.arrays._replace(stiffness=stiffness)
 
 
 def slice_constant(chain: Chain, boundary: AnyBoundary = RING) -> float:
@@ -117,7 +118,7 @@ def slice_constant(chain: Chain, boundary: AnyBoundary = RING) -> float:
     return (
         log_prefactor(chain, boundary)
         - 0.5 * held * math.log(scale / (2.0 * math.pi))
-        + 1.5 * chain.n_free * math.log(scale)
+        + 0.5 * chain.ground.shape[1] * chain.n_free * math.log(scale)
         - 0.5 * (held + 1) * math.log(2.0 * math.pi)
     )
 
@@ -147,26 +148,25 @@ class Constrainer:
         self.turns = float(link if turns is None else turns)
         self.steps = steps_in_RT(chain)
         self.flexibility = chain.flexibility / chain.energy_scale_RT
-        n = chain.n_steps
-        self.along, self.across = np.empty((n, 3)), np.empty((n, 3))
-        rk.register_functionals(chain.ground, chain.form_code, self.turns, self.along, self.across)
+        self.along, self.across = np.empty(chain.ground.shape), np.empty(chain.ground.shape)
+        rk.register_rows(self.steps, self.turns, self.along, self.across)
         self.constant = slice_constant(chain, boundary)
 
     def minimum(
         self, position: float, registers: int, angles: Array, multipliers: Array
     ) -> ConstrainedMinimum | None:
         """Ring at ``position`` on a circle of so many registers, from a start close by."""
-        n = self.chain.n_steps
+        n, c = self.chain.ground.shape
         register = 2.0 * math.pi * position / registers
         angles, multipliers = angles.copy(), multipliers.copy()
         factors = SliceFactors(
-            rows=np.empty((ROWS, 3 * n)),
-            right=np.empty((n, 3, ROWS)),
-            z=np.empty((n, 3, ROWS)),
-            root=np.empty((n, 6)),
-            projector=np.empty((ROWS, 3 * n)),
+            rows=np.empty((ROWS, c * n)),
+            right=np.empty((n, c, ROWS)),
+            z=np.empty((n, c, ROWS)),
+            root=np.empty((n, c * (c + 1) // 2)),
+            projector=np.empty((ROWS, c * n)),
             schur=np.empty((ROWS, ROWS)),
-            directions=np.empty((6, 3 * n)),
+            directions=np.empty((6, c * n)),
         )
         problem = rk.RegisterProblem(
             self.flexibility,

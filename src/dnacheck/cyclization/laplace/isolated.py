@@ -1,6 +1,7 @@
 """Laplace's approximation of the J factor, from the log-determinant that a ring search leaves.
 
-With n = 3N angles, energies in RT and lengths in Å, one minimum contributes
+With n = 3N angles (6N coordinates of rigid steps), energies in RT and lengths in Å, one minimum
+contributes
 
     J = w exp(-E) sqrt(det(K / 2 pi)) (2 pi)^((n - m)/2) / sqrt(|det KKT|),
 
@@ -21,7 +22,7 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from dnacheck.cyclization.laplace.kernels.register import register_functionals, register_of
+from dnacheck.cyclization.laplace.kernels.register import register_of, register_rows
 from dnacheck.cyclization.result import (
     PER_CUBIC_ANGSTROM_IN_MOLAR,
     JFactor,
@@ -95,9 +96,8 @@ def register_spread(
     ``turns`` are those of the register's rows, the link of a ring; ``multipliers`` (6,) are
     reduced. Infinite for a zero mode, such as a straight molecule has.
     """
-    n = chain.n_steps
-    along, across = np.empty((n, 3)), np.empty((n, 3))
-    register_functionals(chain.ground, chain.form_code, float(turns), along, across)
+    along, across = np.empty(chain.ground.shape), np.empty(chain.ground.shape)
+    register_rows(chain.arrays, float(turns), along, across)
     register, extent = register_of(angles, along, across)
     row = (math.cos(register) * across - math.sin(register) * along) / extent
     inverse = ProjectedInverse(chain, angles, multipliers, boundary.for_chain(chain))

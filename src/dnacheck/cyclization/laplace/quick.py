@@ -14,6 +14,7 @@ from dnacheck.cyclization.laplace.kernels import quick as qk
 from dnacheck.equilibria.ring import Equilibria
 from dnacheck.model.chain import Chain
 from dnacheck.model.chain_kernels import BOUND_STIFFNESS, HingeSteps
+from dnacheck.model.rigid_kernels import RigidSteps
 from dnacheck.numerics.outcome import SolveError
 
 Array = NDArray[np.float64]
@@ -31,16 +32,16 @@ _FOLDED = 0.05
 
 
 @lru_cache(maxsize=1024)
-def common_normals(n_steps: int) -> Array:
-    """Standard normal numbers (P, N, 3) of the pairs for molecules of one length."""
+def common_normals(n_steps: int, width: int = 3) -> Array:
+    """Standard normal numbers (P, N, c) of the pairs for molecules of one length."""
     pairs = math.ceil((n_steps / _STEPS_A_ROOT_PAIR) ** 2)
     pairs = min(max(pairs, _FEWEST_PAIRS), _MOST_PAIRS)
-    return np.random.default_rng([_SEED, n_steps]).standard_normal((pairs, n_steps, 3))
+    return np.random.default_rng([_SEED, n_steps]).standard_normal((pairs, n_steps, width))
 
 
 def quick_limits(chain: Chain, draws: bool = True) -> qk.QuickLimits:
     """The limits for one molecule; without ``draws`` the register integral alone."""
-    normals = common_normals(chain.n_steps)
+    normals = common_normals(*chain.ground.shape)
     return qk.QuickLimits(
         normals if draws else normals[:0], slice_constant(chain), 1.5, 8, 24, 5.0, 0.1
     )
@@ -81,7 +82,9 @@ class QuickJ:
         return "good" if self.stderr <= _GOOD else "fair"
 
 
-def quick_of_minima(chain: Chain, cut: HingeSteps, minima: qk.KnownMinima) -> QuickJ | None:
+def quick_of_minima(
+    chain: Chain, cut: HingeSteps | RigidSteps, minima: qk.KnownMinima
+) -> QuickJ | None:
     """ln J from minima of the ring cut somewhere: reduced steps ``cut`` of ``chain``.
 
     None where no register could be covered or no draw closed.
@@ -108,7 +111,7 @@ def quick_j(search: Equilibria) -> QuickJ:
     rings = [ring for ring in search.equilibria if ring.stable is not False]
     rings = [r for r in rings if r.energy_RT < rings[0].energy_RT + QUICK_WINDOW_RT]
     value = None
-    if rings and isinstance(chain.arrays, HingeSteps):
+    if rings:
         minima = qk.KnownMinima(
             np.array([ring.angles for ring in rings]),
             chain.energy_scale_RT * np.array([ring.multipliers for ring in rings]),

@@ -32,8 +32,7 @@ from dnacheck.cyclization.laplace.isolated import register_spread, register_turn
 from dnacheck.cyclization.laplace.kernels import register as rk
 from dnacheck.cyclization.laplace.kernels.gaussian import ROWS
 from dnacheck.cyclization.result import JFactor, JStatus, LinkShare, link_shares
-from dnacheck.equilibria.discrete.kernels.search import best_register
-from dnacheck.equilibria.discrete.kernels.starts import fill_circle
+from dnacheck.equilibria.discrete.kernels.search import best_register, fill_start
 from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
 from dnacheck.equilibria.ring import RING, Equilibria
 from dnacheck.model.chain import Chain
@@ -85,7 +84,7 @@ class Chart:
         return math.log(self.spacing) + _log_sum([ring.log_density for ring in self.rings])
 
     def rivals(self, ring: ConstrainedMinimum) -> Array:
-        """Angles (R, N, 3) of the other rings at the same register."""
+        """Angles (R, N, c) of the other rings at the same register."""
         others = [r.angles for r in self.rings if r.position == ring.position and r is not ring]
         return np.array(others) if others else np.empty((0, *ring.angles.shape))
 
@@ -195,9 +194,8 @@ def _seeds(search: Equilibria) -> tuple[dict[int, list[tuple[Array, Array]]], fl
         seeds.setdefault(link, []).append((np.array(ring.angles), force))
     for link in search.links_searched:
         if link not in seeds:
-            circle = np.empty((chain.n_steps, 3))
-            register = best_register(chain.arrays, link)
-            fill_circle(chain.ground, chain.form_code, link, register, circle)
+            circle = np.empty(chain.ground.shape)
+            fill_start(chain.arrays, link, best_register(chain.arrays, link), circle)
             seeds[link] = [(circle, np.zeros(ROWS))]
     return seeds, origin
 

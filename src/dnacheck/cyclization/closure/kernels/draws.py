@@ -27,7 +27,7 @@ from dnacheck.cyclization.closure.kernels.projection import (
 )
 from dnacheck.cyclization.laplace.kernels.gaussian import dot, draw_closed
 from dnacheck.equilibria.boundary_kernels import Boundary
-from dnacheck.numerics.curve_topology import link_of_ring
+from dnacheck.equilibria.discrete.kernels.states import link_of
 
 COUNTED = 0
 NO_CROSSING = 1
@@ -47,14 +47,14 @@ class SliceCentre(NamedTuple):
 
     Attributes
     ----------
-    angles, direction : ndarray, shape (N, 3)
+    angles, direction : ndarray, shape (N, c)
         The minimum, and the row of |S| at its register.
     energy, extent : float
         In RT, and |S|.
     link : int
     covered : ndarray, shape (C,)
         Links that have charts of their own.
-    rivals : ndarray, shape (R, N, 3)
+    rivals : ndarray, shape (R, N, c)
         Other minima of the same link and register; a shape nearer to one of them is theirs.
     boundary : Boundary
     topological : bool
@@ -104,7 +104,7 @@ class DrawRecord(NamedTuple):
         Weight of the other crossings, 0 where not probed.
     corrections : ndarray, shape (pairs, 2, 6)
         y.
-    strains : ndarray, shape (pairs, 2, N, 3) or (0, 2, N, 3)
+    strains : ndarray, shape (pairs, 2, N, c) or (0, 2, N, c)
         q - q^ of counted draws, 0 for the others; no pairs, where they are not wanted.
     """
 
@@ -120,13 +120,13 @@ class DrawRecord(NamedTuple):
 def _energy(angles: Any, ground: Any, stiffness: Any) -> float:
     """Elastic energy (2.3) in the units of ``stiffness``."""
     energy = 0.0
-    for s in range(angles.shape[0]):
-        x0 = angles[s, 0] - ground[s, 0]
-        x1 = angles[s, 1] - ground[s, 1]
-        x2 = angles[s, 2] - ground[s, 2]
-        k = stiffness[s]
-        energy += 0.5 * (k[0, 0] * x0 * x0 + k[1, 1] * x1 * x1 + k[2, 2] * x2 * x2)
-        energy += k[0, 1] * x0 * x1 + k[0, 2] * x0 * x2 + k[1, 2] * x1 * x2
+    n, c = angles.shape
+    for s in range(n):
+        for j in range(c):
+            pull = 0.5 * stiffness[s, j, j] * (angles[s, j] - ground[s, j])
+            for k in range(j):
+                pull += stiffness[s, j, k] * (angles[s, k] - ground[s, k])
+            energy += pull * (angles[s, j] - ground[s, j])
     return energy
 
 
@@ -153,11 +153,12 @@ def _link_and_chart(shape: Any, centre: Any) -> tuple[int, int]:
     """Link of a shape, or what stands for it where the end is free, and who counts the shape."""
     covered = centre.covered
     if centre.topological:
-        found = link_of_ring(shape.centres, shape.frames)[0]
+        found = link_of(shape.state)
         return found, chart_of_link(found, covered)
     total = 0.0
-    for s in range(shape.angles.shape[0]):
-        total += shape.angles[s, 0]
+    angles = shape.state.angles
+    for s in range(angles.shape[0]):
+        total += angles[s, 0]
     found = int(round(total / (2.0 * math.pi) - centre.turns))
     nearest = covered[0]
     for i in range(covered.shape[0]):
@@ -171,7 +172,7 @@ def _log_weight(
     shape: Any, det: float, quadratic: float, steps: Any, centre: Any
 ) -> tuple[float, int, int]:
     """Log-weight of a shape, what became of it, and its link."""
-    angles = shape.angles
+    angles = shape.state.angles
     found = dot(centre.direction.reshape(angles.size), angles.reshape(angles.size))
     if not found > 0.0:
         return -math.inf, OTHER_SIDE, NO_LINK
@@ -199,7 +200,7 @@ def draw_pairs(rng: Any, steps: Any, centre: Any, factors: Any, probes: Any, rec
 
     Parameters
     ----------
-    steps : HingeSteps, stiffness in RT. centre : SliceCentre.
+    steps : HingeSteps or RigidSteps, stiffness in RT. centre : SliceCentre.
     factors : SliceFactors, as filled by
         :func:`dnacheck.cyclization.laplace.kernels.register.constrained_minimum`.
     probes : Probes. record : DrawRecord, filled.
@@ -208,12 +209,11 @@ def draw_pairs(rng: Any, steps: Any, centre: Any, factors: Any, probes: Any, rec
     -------
     unfinished : probes that reached the bound on trials.
     """
-    n = centre.angles.shape[0]
-    m = 3 * n
-    form = steps.form
-    shape = empty_shape(n, form, centre.boundary)
-    normals = np.empty((n, 3))
-    x = np.empty((n, 3))
+    n, c = centre.angles.shape
+    m = c * n
+    shape = empty_shape(steps, centre.boundary)
+    normals = np.empty((n, c))
+    x = np.empty((n, c))
     draw = x.reshape(m)
     flat_centre = centre.angles.reshape(m)
     directions = factors.directions
@@ -221,12 +221,12 @@ def draw_pairs(rng: Any, steps: Any, centre: Any, factors: Any, probes: Any, rec
     trial = np.empty(6)
     unfinished = 0
     for pair in range(record.log_weights.shape[0]):
-        quadratic = draw_closed(rng, factors, normals, x)
+        quadratic = draw_closed(steps, rng, factors, normals, x)
         for side in range(2):
             if side == 1:
                 for k in range(m):
                     draw[k] = -draw[k]
-            met, det = follow(flat_centre, draw, directions, form, y, shape)
+            met, det = follow(steps, flat_centre, draw, directions, y, shape)
             weight, code, shape_link = -math.inf, NO_CROSSING, NO_LINK
             if met:
                 weight, code, shape_link = _log_weight(shape, det, quadratic, steps, centre)
@@ -238,8 +238,8 @@ def draw_pairs(rng: Any, steps: Any, centre: Any, factors: Any, probes: Any, rec
                 record.corrections[pair, side, i] = y[i] if met else math.nan
             if record.strains.shape[0] > 0:
                 for s in range(n):
-                    for k in range(3):
-                        strain = shape.angles[s, k] - steps.ground[s, k]
+                    for k in range(c):
+                        strain = shape.state.angles[s, k] - steps.ground[s, k]
                         record.strains[pair, side, s, k] = strain if code == COUNTED else 0.0
             chance = probes.rate if met else min(1.0, 8.0 * probes.rate)
             if not (chance > 0.0 and rng.random() < chance):
@@ -247,7 +247,7 @@ def draw_pairs(rng: Any, steps: Any, centre: Any, factors: Any, probes: Any, rec
             # Probe: any crossing but the one counted above.
             _random_start(rng, probes.mean, probes.root, trial)
             code, det = newton_projection(
-                flat_centre, draw, 1.0, directions, form, True, _PROBE_ITERATIONS, trial, shape
+                steps, flat_centre, draw, 1.0, directions, True, _PROBE_ITERATIONS, trial, shape
             )
             if code < 0 or (met and same_solution(trial, y)):
                 continue
@@ -265,7 +265,7 @@ def draw_pairs(rng: Any, steps: Any, centre: Any, factors: Any, probes: Any, rec
                 trials += 1
                 _random_start(rng, probes.mean, probes.root, trial)
                 code, det = newton_projection(
-                    flat_centre, draw, 1.0, directions, form, True, _PROBE_ITERATIONS, trial, shape
+                    steps, flat_centre, draw, 1.0, directions, True, _PROBE_ITERATIONS, trial, shape
                 )
                 again = code >= 0 and same_solution(trial, y)
             if not again:

@@ -15,9 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from dnacheck.equilibria.boundary_kernels import Boundary, end_residual, place_start
-from dnacheck.equilibria.discrete.kernels.closure import closure_jacobian, linearise_placed
-from dnacheck.model.chain_kernels import WEDGE
+from dnacheck.equilibria.boundary_kernels import Boundary
+from dnacheck.equilibria.discrete.kernels.states import evaluate, jacobian, new_state
 
 CLOSED = 1e-9
 """Closure residual, displacement over contour length and radians, at which a shape is closed;
@@ -29,42 +28,23 @@ _SMALLEST_RAY_STEP = 1e-3
 
 
 class Shape(NamedTuple):
-    """A shape and what its closure is computed from; every projection overwrites it.
+    """A shape and the Jacobian of its closure; every projection overwrites it.
 
     Attributes
     ----------
-    angles : ndarray, shape (N, 3)
-    centres, frames : ndarray, shapes (N + 1, 3), (N + 1, 3, 3)
-    axes : ndarray, shape (N, 3, 3)
-    halves : ndarray, shape (N, 5, 3), or (0, 5, 3) for the wedge
-    jacobian : ndarray, shape (6, 3N)
-    boundary : Boundary
-        What the end is held to.
+    state : HingeState or RigidState
+        With the boundary that holds its end.
+    jacobian : ndarray, shape (6, cN)
     """
 
-    angles: Any
-    centres: Any
-    frames: Any
-    axes: Any
-    halves: Any
+    state: Any
     jacobian: Any
-    boundary: Boundary
 
 
 @njit(cache=True, nogil=True)
-def empty_shape(n: int, form: int, boundary: Boundary) -> Shape:
-    """Room for a shape of ``n`` steps, placed for a boundary."""
-    shape = Shape(
-        np.empty((n, 3)),
-        np.empty((n + 1, 3)),
-        np.empty((n + 1, 3, 3)),
-        np.empty((n, 3, 3)),
-        np.empty((n if form != WEDGE else 0, 5, 3)),
-        np.empty((6, 3 * n)),
-        boundary,
-    )
-    place_start(boundary, shape.centres[0], shape.frames[0])
-    return shape
+def empty_shape(steps: Any, boundary: Boundary) -> Shape:
+    """Room for a shape of a chain of ``steps``, placed for a boundary."""
+    return Shape(new_state(steps, boundary), np.empty((6, steps.ground.size)))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -100,11 +80,11 @@ def solve_six(matrix: Any, rhs: Any, out: Any) -> float:
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
-def _transverse(jacobian: Any, directions: Any, out: Any) -> None:
-    """G Y (6, 6) from G (6, 3N) and Y stored as (6, 3N)."""
-    n = jacobian.shape[1]
+def _transverse(rows: Any, directions: Any, out: Any) -> None:
+    """G Y (6, 6) from G (6, cN) and Y stored as (6, cN)."""
+    n = rows.shape[1]
     for i in range(6):
-        g = jacobian[i]
+        g = rows[i]
         for j in range(6):
             y = directions[j]
             total = 0.0
@@ -115,7 +95,7 @@ def _transverse(jacobian: Any, directions: Any, out: Any) -> None:
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
 def _displace(centre: Any, draw: Any, t: float, directions: Any, y: Any, out: Any) -> None:
-    """out = centre + t draw + Y y, all flat (3N,)."""
+    """out = centre + t draw + Y y, all flat (cN,)."""
     y0, y1, y2, y3, y4, y5 = y[0], y[1], y[2], y[3], y[4], y[5]
     for k in range(centre.shape[0]):
         a = (
@@ -130,11 +110,11 @@ def _displace(centre: Any, draw: Any, t: float, directions: Any, y: Any, out: An
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def newton_projection(
+    steps: Any,
     centre: Any,
     draw: Any,
     t: float,
     directions: Any,
-    form: int,
     damped: bool,
     most: int,
     y: Any,
@@ -150,22 +130,19 @@ def newton_projection(
     code : iterations used, -1 if it did not converge.
     det : det G Y at the shape found, relative to its value 1 at the centre.
     """
-    n = shape.angles.shape[0]
-    centres, frames, axes = shape.centres, shape.frames, shape.axes
-    fixed = shape.boundary.fixed
-    turn = np.zeros(1)
-    closure = np.empty(6)
+    state = shape.state
+    n = state.angles.shape[0]
+    closure, fixed = state.closure, state.boundary.fixed
     matrix = np.empty((6, 6))
     step = np.empty(6)
     last = np.empty(6)
-    flat = shape.angles.reshape(3 * n)
+    flat = state.angles.reshape(state.angles.size)
     size_before = math.inf
     fraction = 1.0
     det = 0.0
     for iteration in range(most):
         _displace(centre, draw, t, directions, y, flat)
-        linearise_placed(shape.angles, form, centres, frames, axes, shape.halves)
-        end_residual(shape.boundary, centres[n], frames[n], turn, closure)
+        evaluate(state, steps)
         size = 0.0
         for i in range(6):
             size += (closure[i] / (n if i < 3 else 1.0)) ** 2
@@ -180,7 +157,7 @@ def newton_projection(
             continue
         if not damped and not size < 4.0 * size_before:
             return -1, 0.0
-        closure_jacobian(centres, axes, shape.jacobian)
+        jacobian(state, shape.jacobian)
         _transverse(shape.jacobian, directions, matrix)
         for i in range(6):
             if not fixed[i]:
@@ -201,7 +178,7 @@ def newton_projection(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def follow(
-    centre: Any, draw: Any, directions: Any, form: int, y: Any, shape: Any
+    steps: Any, centre: Any, draw: Any, directions: Any, y: Any, shape: Any
 ) -> tuple[bool, float]:
     """The crossing on the branch through the centre, by Newton or, failing that, along the ray.
 
@@ -219,7 +196,7 @@ def follow(
             y[i] = 0.0
             if reached > 0.0:
                 y[i] = here[i] + (here[i] - back[i]) * (t - reached) / (reached - before)
-        code, det = newton_projection(centre, draw, t, directions, form, False, 8, y, shape)
+        code, det = newton_projection(steps, centre, draw, t, directions, False, 8, y, shape)
         if code >= 0:
             if t >= 1.0:
                 return True, det

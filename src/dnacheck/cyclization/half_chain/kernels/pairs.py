@@ -13,7 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from dnacheck.model.chain_kernels import step_rotation
+from dnacheck.equilibria.discrete.kernels.states import by_kind
+from dnacheck.model.chain_kernels import HingeSteps, step_rotation
+from dnacheck.model.rigid_kernels import RigidSteps, linearise_rigid, new_kinematics
 from dnacheck.numerics.rotations import matrix_from_quaternion, quaternion_from_matrix
 
 
@@ -102,27 +104,25 @@ class PairTotals(NamedTuple):
     columns: Any
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def half_poses(
-    normals: Any,
-    roots: Any,
-    centre: Any,
-    ground: Any,
-    form: int,
-    backward: bool,
-    poses: Any,
-) -> None:
-    """Poses of halves drawn about one centre.
+@njit(cache=True, nogil=True)
+def _put_pose(r: Any, f: Any, backward: bool, pose: Any) -> None:
+    """Pose (7,) of the joint from that of a half's end, position (3,) and frame (3, 3)."""
+    for i in range(3):
+        if backward:
+            pose[i] = -(f[0, i] * r[0] + f[1, i] * r[1] + f[2, i] * r[2])
+        else:
+            pose[i] = r[i]
+    quaternion_from_matrix(f, pose[3:])
+    if backward:
+        for i in range(3, 6):
+            pose[i] = -pose[i]
 
-    Parameters
-    ----------
-    normals : (M, n, 3), standard normal numbers; overwritten with the strains q - q^.
-    roots : (n, 3, 3), Cholesky roots of the covariance of each step's angles.
-    centre, ground : (n, 3), mean and unstressed angles in radians.
-    form : 0 for the wedge, 1 for the mid-step product.
-    backward : whether the half is followed from its far end to its near one.
-    poses : (M, 7), filled; see :class:`Halves`.
-    """
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _hinge_poses(
+    steps: HingeSteps, normals: Any, roots: Any, centre: Any, backward: bool, poses: Any
+) -> None:
+    ground, form = steps.ground, steps.form
     n = normals.shape[1]
     step = np.empty((3, 3))
     f = np.empty((3, 3))
@@ -149,15 +149,35 @@ def half_poses(
             for i in range(3):
                 for j in range(3):
                     f[i, j] = g[i, j]
-        for i in range(3):
-            if backward:
-                poses[m, i] = -(f[0, i] * r[0] + f[1, i] * r[1] + f[2, i] * r[2])
-            else:
-                poses[m, i] = r[i]
-        quaternion_from_matrix(f, poses[m, 3:])
-        if backward:
-            for i in range(3, 6):
-                poses[m, i] = -poses[m, i]
+        _put_pose(r, f, backward, poses[m])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _rigid_poses(
+    steps: RigidSteps, normals: Any, roots: Any, centre: Any, backward: bool, poses: Any
+) -> None:
+    n, c = centre.shape
+    kinematics = new_kinematics(n)
+    q = np.empty((n, c))
+    for m in range(normals.shape[0]):
+        for s in range(n):
+            for i in range(c):
+                q[s, i] = centre[s, i]
+                for j in range(i + 1):
+                    q[s, i] += roots[s, i, j] * normals[m, s, j]
+            for i in range(c):
+                normals[m, s, i] = q[s, i] - steps.ground[s, i]
+        linearise_rigid(q, kinematics)
+        _put_pose(kinematics.centres[n], kinematics.frames[n], backward, poses[m])
+
+
+half_poses = by_kind(_hinge_poses, _rigid_poses)
+"""Poses of halves drawn about one centre: (steps, normals, roots, centre, backward, poses).
+
+``normals`` (M, n, c) are standard normal numbers, overwritten with the strains q - q^; ``roots``
+(n, c, c) Cholesky roots of the covariance of each step; ``centre`` (n, c) is the mean. ``backward``
+tells whether the half is followed from its far end to its near one. Fills ``poses`` (M, 7).
+"""
 
 
 @njit(cache=True, nogil=True)

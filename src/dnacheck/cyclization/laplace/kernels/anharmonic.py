@@ -30,25 +30,25 @@ def scaled_log_weights(
     steps, centre, factors : as in :func:`dnacheck.cyclization.closure.kernels.draws.draw_pairs`.
     log_weights : (pairs, T, 2), filled; NaN where no closed shape was reached.
     """
-    n = centre.angles.shape[0]
-    m = 3 * n
-    shape = empty_shape(n, steps.form, centre.boundary)
-    angles = shape.angles
-    normals = np.empty((n, 3))
-    x = np.empty((n, 3))
+    n, c = centre.angles.shape
+    m = c * n
+    shape = empty_shape(steps, centre.boundary)
+    angles = shape.state.angles
+    normals = np.empty((n, c))
+    x = np.empty((n, c))
     draw = x.reshape(m)
     scaled = np.empty(m)
     flat_centre = centre.angles.reshape(m)
     y = np.empty(6)
     for pair in range(log_weights.shape[0]):
-        quadratic = draw_closed(rng, factors, normals, x)
+        quadratic = draw_closed(steps, rng, factors, normals, x)
         for index in range(scales.shape[0]):
             t = scales[index]
             for side in range(2):
                 signed = t if side == 0 else -t
                 for k in range(m):
                     scaled[k] = signed * draw[k]
-                met, det = follow(flat_centre, scaled, factors.directions, steps.form, y, shape)
+                met, det = follow(steps, flat_centre, scaled, factors.directions, y, shape)
                 log_weights[pair, index, side] = math.nan
                 if not met:
                     continue
@@ -56,9 +56,9 @@ def scaled_log_weights(
                 # divided by t^2 below, and a difference of energies would lose digits.
                 rise, found = 0.0, 0.0
                 for s in range(n):
-                    for j in range(3):
+                    for j in range(c):
                         found += centre.direction[s, j] * angles[s, j]
-                        for k in range(3):
+                        for k in range(c):
                             change = angles[s, j] - centre.angles[s, j]
                             mean = angles[s, k] + centre.angles[s, k] - 2.0 * steps.ground[s, k]
                             rise += 0.5 * change * steps.stiffness[s, j, k] * mean

@@ -34,11 +34,11 @@ from dnacheck.cyclization.laplace.kernels.register import (
 )
 from dnacheck.equilibria.boundary_kernels import ring_boundary
 from dnacheck.equilibria.discrete.kernels.registers import (
-    register_functionals,
     register_of,
+    register_rows,
     wrapped,
 )
-from dnacheck.model.chain_kernels import HingeSteps, is_bound
+from dnacheck.model.chain_kernels import is_bound
 
 # Positions of the figures of quick_log_j.
 LOG_J, REGISTER_LOG_J, STDERR, FOLDED, SPREAD = range(5)
@@ -59,7 +59,7 @@ class KnownMinima(NamedTuple):
 
     Attributes
     ----------
-    angles : ndarray, shape (M, N, 3)
+    angles : ndarray, shape (M, N, c)
     multipliers : ndarray, shape (M, 6)
         In RT and RT per step.
     links : ndarray, shape (M,)
@@ -75,7 +75,7 @@ class QuickLimits(NamedTuple):
 
     Attributes
     ----------
-    normals : ndarray, shape (P, N, 3)
+    normals : ndarray, shape (P, N, c)
         Standard normal numbers; no pairs leave the register integral.
     constant : float
         ln J(psi) = constant - E - ln det KKT / 2 + ln |S|, see
@@ -112,9 +112,9 @@ class _Chart(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _empty_chart(room: int, n: int) -> _Chart:
+def _empty_chart(room: int, n: int, width: int) -> _Chart:
     return _Chart(
-        np.empty((room, n, 3)),
+        np.empty((room, n, width)),
         np.empty((room, ROWS)),
         np.empty(room, np.int64),
         np.empty(room, np.int64),
@@ -125,16 +125,16 @@ def _empty_chart(room: int, n: int) -> _Chart:
 
 
 @njit(cache=True, nogil=True)
-def empty_factors(n: int) -> SliceFactors:
+def empty_factors(n: int, width: int) -> SliceFactors:
     """Room for the Gaussian about one register-constrained minimum."""
     return SliceFactors(
-        np.empty((ROWS, 3 * n)),
-        np.empty((n, 3, ROWS)),
-        np.empty((n, 3, ROWS)),
-        np.empty((n, 6)),
-        np.empty((ROWS, 3 * n)),
+        np.empty((ROWS, width * n)),
+        np.empty((n, width, ROWS)),
+        np.empty((n, width, ROWS)),
+        np.empty((n, width * (width + 1) // 2)),
+        np.empty((ROWS, width * n)),
         np.empty((ROWS, ROWS)),
-        np.empty((6, 3 * n)),
+        np.empty((6, width * n)),
     )
 
 
@@ -146,7 +146,7 @@ def _is_known(chart: _Chart, count: int, link: int, position: int, angles: Any) 
             continue
         worst = 0.0
         for i in range(angles.shape[0]):
-            for j in range(3):
+            for j in range(angles.shape[1]):
                 worst = max(worst, abs(chart.angles[s, i, j] - angles[i, j]))
         if worst < _SAME_SHAPE:
             return True
@@ -283,10 +283,9 @@ def _cover_link(
 
     ``best`` is the largest logarithm of a density per radian so far.
     """
-    n = steps.ground.shape[0]
-    along, across = np.empty((n, 3)), np.empty((n, 3))
-    register_functionals(steps.ground, steps.form, float(link), along, across)
-    q, m, figure = np.empty((n, 3)), np.zeros(ROWS), np.empty(N_FIGURES)
+    along, across = np.empty(steps.ground.shape), np.empty(steps.ground.shape)
+    register_rows(steps, float(link), along, across)
+    q, m, figure = np.empty(steps.ground.shape), np.zeros(ROWS), np.empty(N_FIGURES)
     work = (q, m, figure, factors)
     began = count
     origin, width, registers, spread = 0.0, 0.0, 0, math.inf
@@ -354,8 +353,8 @@ def _is_nearest(chart: _Chart, count: int, own: int, angles: Any, stiffness: Any
         for s in range(angles.shape[0]):
             if is_bound(stiffness, s):
                 continue
-            for i in range(3):
-                for j in range(3):
+            for i in range(angles.shape[1]):
+                for j in range(angles.shape[1]):
                     a = angles[s, i] - chart.angles[r, s, i]
                     b = angles[s, j] - chart.angles[r, s, j]
                     c = angles[s, i] - chart.angles[own, s, i]
@@ -368,13 +367,13 @@ def _is_nearest(chart: _Chart, count: int, own: int, angles: Any, stiffness: Any
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def quick_log_j(
-    steps: HingeSteps, flexibility: Any, minima: KnownMinima, limits: QuickLimits, figures: Any
+    steps: Any, flexibility: Any, minima: KnownMinima, limits: QuickLimits, figures: Any
 ) -> bool:
     """ln J (mol/L) from the minima of a molecule.
 
     Parameters
     ----------
-    steps : HingeSteps, stiffness in RT. flexibility : (N, 3, 3), its inverses.
+    steps : HingeSteps or RigidSteps, stiffness in RT. flexibility : (N, c, c), its inverses.
     minima : KnownMinima, lowest first within a link. limits : QuickLimits.
     figures : (5,), filled with ln J; ln J by the register integral alone; the standard error of
         the mean weight; the part of the draws that reach no closed shape; and the standard
@@ -384,11 +383,11 @@ def quick_log_j(
     -------
     found : whether there is a value.
     """
-    n = steps.ground.shape[0]
+    n, width = steps.ground.shape
     pairs = limits.normals.shape[0]
     figures[:] = math.nan
-    chart = _empty_chart(4 * limits.most, n)
-    factors = empty_factors(n)
+    chart = _empty_chart(4 * limits.most, n, width)
+    factors = empty_factors(n, width)
     count = 0
     best = -math.inf
     for k in range(minima.links.shape[0]):
@@ -415,19 +414,20 @@ def quick_log_j(
     if pairs == 0:
         return True
     boundary = ring_boundary()
-    shape = empty_shape(n, steps.form, boundary)
-    along, across = np.empty((n, 3)), np.empty((n, 3))
-    q, m = np.empty((n, 3)), np.empty(ROWS)
+    shape = empty_shape(steps, boundary)
+    angles = shape.state.angles
+    along, across = np.empty((n, width)), np.empty((n, width))
+    q, m = np.empty((n, width)), np.empty(ROWS)
     figure = np.empty(N_FIGURES)
-    x, y = np.empty((n, 3)), np.empty(6)
-    draw, centre = x.reshape(3 * n), q.reshape(3 * n)
+    x, y = np.empty((n, width)), np.empty(6)
+    draw, centre = x.reshape(width * n), q.reshape(width * n)
     first, second, folded = 0.0, 0.0, 0
     pair, passed = 0, 0.0
     for s in range(count):
         passed += math.exp(masses[s] - top) / total
         if not (pair < pairs and (pair + 0.5) / pairs < passed):
             continue
-        register_functionals(steps.ground, steps.form, float(chart.links[s]), along, across)
+        register_rows(steps, float(chart.links[s]), along, across)
         q[:] = chart.angles[s]
         m[:] = chart.multipliers[s]
         problem = RegisterProblem(
@@ -436,31 +436,31 @@ def quick_log_j(
         usable = constrained_minimum(steps, problem, q, m, factors, figure) == FOUND
         c, sn = math.cos(chart.registers[s]), math.sin(chart.registers[s])
         while pair < pairs and (pair + 0.5) / pairs < passed:
-            quadratic = closed_of_normals(factors, limits.normals[pair], x)
+            quadratic = closed_of_normals(steps, factors, limits.normals[pair], x)
             weight = 0.0
             for side in range(2):
                 if side == 1:
-                    for k in range(3 * n):
+                    for k in range(width * n):
                         draw[k] = -draw[k]
                 met, det = False, 0.0
                 if usable:
-                    met, det = follow(centre, draw, factors.directions, steps.form, y, shape)
+                    met, det = follow(steps, centre, draw, factors.directions, y, shape)
                 if not met:
                     folded += 1
                     continue
                 found, rise = 0.0, 0.0
                 for t in range(n):
-                    for i in range(3):
-                        angle = shape.angles[t, i]
+                    for i in range(width):
+                        angle = angles[t, i]
                         found += (c * along[t, i] + sn * across[t, i]) * angle
-                        for j in range(0 if is_bound(steps.stiffness, t) else 3):
+                        for j in range(0 if is_bound(steps.stiffness, t) else width):
                             rise += (
                                 0.5 * (angle - q[t, i]) * steps.stiffness[t, i, j]
-                                * (shape.angles[t, j] + q[t, j] - 2.0 * steps.ground[t, j])
+                                * (angles[t, j] + q[t, j] - 2.0 * steps.ground[t, j])
                             )  # fmt: skip
                 if not found > 0.0:
                     continue
-                if not _is_nearest(chart, count, s, shape.angles, steps.stiffness):
+                if not _is_nearest(chart, count, s, angles, steps.stiffness):
                     continue
                 weight += 0.5 * math.exp(0.5 * quadratic - rise) / abs(det) * found / figure[EXTENT]
             first += weight

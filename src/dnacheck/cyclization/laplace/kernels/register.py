@@ -24,14 +24,11 @@ from dnacheck.cyclization.laplace.kernels.gaussian import (
     solve_slice,
     stiff_columns,
 )
-from dnacheck.equilibria.boundary_kernels import Boundary, end_residual, place_start
-from dnacheck.equilibria.discrete.kernels.closure import energy_gradient, linearise_placed
-from dnacheck.equilibria.discrete.kernels.registers import (
-    register_functionals as register_functionals,
-)
+from dnacheck.equilibria.boundary_kernels import Boundary
 from dnacheck.equilibria.discrete.kernels.registers import register_of as register_of
-from dnacheck.equilibria.discrete.kernels.states import hold_ground, still_axes
-from dnacheck.model.chain_kernels import WEDGE, is_bound
+from dnacheck.equilibria.discrete.kernels.registers import register_rows as register_rows
+from dnacheck.equilibria.discrete.kernels.states import evaluate, hold_ground, new_state
+from dnacheck.model.chain_kernels import is_bound
 
 FOUND = 0
 NOT_CONVERGED = 1
@@ -46,7 +43,7 @@ CLOSED = 1e-7
 """Closure residual (steps, radians) of a register-constrained minimum. Newton's last step leaves
 far less; and what is left changes no sampled J, whose draws close by themselves."""
 _TURN_CAP = 0.1
-"""Largest change of one angle in one iteration, in radians."""
+"""Largest change of one coordinate in one iteration, in radians and step lengths."""
 _FIRST_PENALTY = 4.0
 _PENALTY_RISES = 8
 
@@ -56,10 +53,10 @@ class RegisterProblem(NamedTuple):
 
     Attributes
     ----------
-    inverse_stiffness : ndarray, shape (N, 3, 3)
+    inverse_stiffness : ndarray, shape (N, c, c)
         In 1/RT.
-    along, across : ndarray, shape (N, 3)
-        Rows of Re S and Im S, see :func:`register_functionals`.
+    along, across : ndarray, shape (N, c)
+        Rows of Re S and Im S, see :data:`register_rows`.
     register : float
         In radians.
     tolerance : float
@@ -93,8 +90,8 @@ def constrained_minimum(
 
     Parameters
     ----------
-    steps : HingeSteps, stiffness in RT. problem : RegisterProblem.
-    angles, multipliers : (N, 3), (7,); start and result. Energies in RT, lengths in steps.
+    steps : HingeSteps or RigidSteps, stiffness in RT. problem : RegisterProblem.
+    angles, multipliers : (N, c), (7,); start and result. Energies in RT, lengths in steps.
     factors : :class:`dnacheck.cyclization.laplace.kernels.gaussian.SliceFactors`, filled.
     figures : (5,), filled with energy, ln det KKT (RT, steps), |S|, d energy / d register and
         iterations.
@@ -103,46 +100,38 @@ def constrained_minimum(
     -------
     code : FOUND, NOT_CONVERGED, NOT_FINITE or NOT_A_MINIMUM.
     """
-    n = angles.shape[0]
-    form = steps.form
+    n, width = angles.shape
     along, across = problem.along, problem.across
-    right, z, root, schur = factors.right, factors.z, factors.root, factors.schur
-    centres = np.empty((n + 1, 3))
-    frames = np.empty((n + 1, 3, 3))
-    axes = np.empty((n, 3, 3))
-    halves = np.empty((n if form != WEDGE else 0, 5, 3))
-    gradient = np.empty((n, 3))
-    row = np.empty((n, 3))
-    moving = np.empty((n, 3))
-    rows = np.zeros((n, 3, WIDTH))
-    columns = np.empty((n, 3, WIDTH))
-    solved = np.empty((n, 3, WIDTH))
+    schur = factors.schur
+    state = new_state(steps, problem.boundary)
+    gradient = state.gradient
+    row = np.empty((n, width))
+    moving = np.empty((n, width))
+    rows = np.zeros((n, width, WIDTH))
+    columns = np.empty((n, width, WIDTH))
+    solved = np.empty((n, width, WIDTH))
     closure = np.empty(ROWS)
     gram = np.empty((ROWS, WIDTH))
     weight = np.empty((ROWS, ROWS))
     small = np.empty((ROWS, WIDTH))
     new = np.empty(ROWS)
-    step = np.empty((n, 3))
-    turn = np.zeros(1)
-    boundary = problem.boundary
-    place_start(boundary, centres[0], frames[0])
+    step = np.empty((n, width))
     c, sn = math.cos(problem.register), math.sin(problem.register)
     for s in range(n):
-        for j in range(3):
+        for j in range(width):
             row[s, j] = c * across[s, j] - sn * along[s, j]
             moving[s, j] = 0.0 if is_bound(steps.stiffness, s) else row[s, j]
     hold_ground(steps, angles)
     for iteration in range(problem.most + 1):
-        linearise_placed(angles, form, centres, frames, axes, halves)
-        still_axes(steps.stiffness, axes)
-        energy = energy_gradient(angles, steps.ground, steps.stiffness, gradient)
-        end_residual(boundary, centres[n], frames[n], turn, closure)
-        constraint_rows(centres, axes, moving, rows)
+        state.angles[:] = angles
+        energy = evaluate(state, steps)
+        closure[:6] = state.closure
+        constraint_rows(state, moving, rows)
         closure[6] = 0.0
         extent = 0.0
         worst = 0.0
         for s in range(n):
-            for j in range(3):
+            for j in range(width):
                 closure[6] += row[s, j] * angles[s, j]
                 extent += (c * along[s, j] + sn * across[s, j]) * angles[s, j]
                 total = gradient[s, j]
@@ -165,51 +154,39 @@ def constrained_minimum(
             return NOT_CONVERGED
         stiff_columns(rows, problem.inverse_stiffness, columns)
         products(rows, columns, gram)
-        drop_free(boundary.fixed, gram, 1.0)
+        drop_free(problem.boundary.fixed, gram, 1.0)
         if math.isnan(invert_small(gram[:, :ROWS], weight)):
             return NOT_FINITE
-        drop_free(boundary.fixed, weight, 0.0)
+        drop_free(problem.boundary.fixed, weight, 0.0)
         rise = _FIRST_PENALTY
         log_det = math.nan
         for _ in range(_PENALTY_RISES):
-            log_det = factorise_slice(
-                steps.stiffness,
-                form,
-                centres,
-                axes,
-                halves,
-                multipliers,
-                rows,
-                rise * weight,
-                right,
-                z,
-                root,
-            )
+            log_det = factorise_slice(state, steps, multipliers, rows, rise * weight, factors)
             if not math.isnan(log_det):
                 break
             rise *= 4.0
         if math.isnan(log_det):
             return NOT_A_MINIMUM
         for s in range(n):
-            for j in range(3):
+            for j in range(width):
                 for i in range(ROWS):
                     solved[s, j, i] = rows[s, j, i]
                 solved[s, j, ROWS] = gradient[s, j]
-        solve_slice(right, z, root, solved)
+        solve_slice(steps, factors, solved)
         products(rows, solved, small)
-        drop_free(boundary.fixed, small, 1.0)
+        drop_free(problem.boundary.fixed, small, 1.0)
         log_small = invert_small(small[:, :ROWS], schur)
         if math.isnan(log_small):
             return NOT_FINITE
-        drop_free(boundary.fixed, schur, 0.0)
+        drop_free(problem.boundary.fixed, schur, 0.0)
         if done:
             figures[LOG_DET_KKT] = log_det + log_small
             combine(solved, schur, ROWS, factors.projector)
             combine(columns, weight, 6, factors.directions)
             for s in range(n):
-                for j in range(3):
+                for j in range(width):
                     for i in range(ROWS):
-                        factors.rows[i, 3 * s + j] = rows[s, j, i]
+                        factors.rows[i, width * s + j] = rows[s, j, i]
             return FOUND
         for i in range(ROWS):
             new[i] = 0.0
@@ -217,7 +194,7 @@ def constrained_minimum(
                 new[i] += schur[i, j] * (closure[j] - small[j, ROWS])
         largest = 0.0
         for s in range(n):
-            for k in range(3):
+            for k in range(width):
                 total = solved[s, k, ROWS]
                 for i in range(ROWS):
                     total += solved[s, k, i] * new[i]
@@ -225,7 +202,7 @@ def constrained_minimum(
                 largest = max(largest, abs(total))
         fraction = 1.0 if largest <= _TURN_CAP else _TURN_CAP / largest
         for s in range(n):
-            for k in range(3):
+            for k in range(width):
                 angles[s, k] += fraction * step[s, k]
         for i in range(ROWS):
             # M holds the penalty, whose force on the step is not a multiplier.

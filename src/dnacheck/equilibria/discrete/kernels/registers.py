@@ -4,7 +4,8 @@ The register is the phase of S = sum_s exp(i alpha_s) (-theta_s + i phi_s), with
 that a uniformly overtwisted ring of the given link accumulates up to the bend of step s: the
 direction of the mean bending axis in a frame that does not turn about the ring. S is linear in
 the angles, so the shapes of one register form a half hyperplane, and the register's range is a
-circle: every shape has one register unless S = 0.
+circle: every shape has one register unless S = 0. Of rigid steps S is the sum of exp(i alpha_s)
+(tilt_s + i roll_s), with alpha_s the twist up to the middle of step s.
 """
 
 from __future__ import annotations
@@ -14,7 +15,9 @@ from typing import Any, NamedTuple
 
 from numba import njit
 
-from dnacheck.model.chain_kernels import WEDGE
+from dnacheck.equilibria.discrete.kernels.states import by_kind
+from dnacheck.model.chain_kernels import WEDGE, HingeSteps
+from dnacheck.model.rigid_kernels import RigidSteps
 
 
 class KnownRegister(NamedTuple):
@@ -51,8 +54,36 @@ def register_functionals(ground: Any, form: int, link: float, along: Any, across
 
 
 @njit(cache=True, nogil=True)
+def _hinge_functionals(steps: HingeSteps, link: float, along: Any, across: Any) -> None:
+    register_functionals(steps.ground, steps.form, link, along, across)
+
+
+@njit(cache=True, nogil=True)
+def _rigid_functionals(steps: RigidSteps, link: float, along: Any, across: Any) -> None:
+    ground = steps.ground
+    n = ground.shape[0]
+    total = 0.0
+    for s in range(n):
+        total += ground[s, 0]
+    excess = (2.0 * math.pi * link - total) / n
+    along[:], across[:] = 0.0, 0.0
+    phase = 0.0
+    for s in range(n):
+        twist = ground[s, 0] + excess
+        middle = phase + 0.5 * twist
+        c, sn = math.cos(middle), math.sin(middle)
+        along[s, 1], along[s, 2] = c, -sn
+        across[s, 1], across[s, 2] = sn, c
+        phase += twist
+
+
+register_rows = by_kind(_hinge_functionals, _rigid_functionals)
+"""Rows of Re S and Im S, each (N, c): (steps, link, along, across)."""
+
+
+@njit(cache=True, nogil=True)
 def register_of(angles: Any, along: Any, across: Any) -> tuple[float, float]:
-    """Register in radians and |S| of a shape (N, 3)."""
+    """Register in radians and |S| of a shape (N, c)."""
     x, y = 0.0, 0.0
     for s in range(angles.shape[0]):
         x += along[s, 1] * angles[s, 1] + along[s, 2] * angles[s, 2]

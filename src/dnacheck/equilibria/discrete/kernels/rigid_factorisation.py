@@ -109,6 +109,99 @@ def _bent(p: float, r: float, b: float, c: float, d: float, n: Any) -> Any:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+def step_block(
+    s: int,
+    coordinates: Any,
+    kinematics: RigidKinematics,
+    stiffness: Any,
+    multipliers: Any,
+    held: float,
+) -> Any:
+    """Step ``s`` in the Lagrangian's Hessian, plus ``held`` times the products of its axes.
+
+    Returns
+    -------
+    a_r, b_r, e_r : of twist, tilt and roll: axes, displacements of the end, and couplings E such
+        that the Hessian between an earlier coordinate j and a later one k is a_j . e_k.
+    b_t, e_t : of shift, slide and rise, whose axes are zero.
+    d_rr, d_rt : own block of the angles (lower triangle), and of angles (rows) with translations.
+        That of the translations is the stiffness.
+    """
+    centres, frames = kinematics.centres, kinematics.frames
+    axes, velocities, local = kinematics.axes, kinematics.velocities, kinematics.local
+    n = coordinates.shape[0]
+    force = (multipliers[0], multipliers[1], multipliers[2])
+    moment = (multipliers[3], multipliers[4], multipliers[5])
+    half = (0.5 * moment[0], 0.5 * moment[1], 0.5 * moment[2])
+    d = (
+        centres[n, 0] - centres[s + 1, 0],
+        centres[n, 1] - centres[s + 1, 1],
+        centres[n, 2] - centres[s + 1, 2],
+    )
+    arm = (
+        centres[s + 1, 0] - centres[s, 0],
+        centres[s + 1, 1] - centres[s, 1],
+        centres[s + 1, 2] - centres[s, 2],
+    )
+    a0, a1, a2 = _row(axes, s, 0), _row(axes, s, 1), _row(axes, s, 2)
+    v0, v1, v2 = _row(velocities, s, 0), _row(velocities, s, 1), _row(velocities, s, 2)
+    x0, x1, x2 = cross(a0, d), cross(a1, d), cross(a2, d)
+    c0, c1, c2 = cross(x0, force), cross(x1, force), cross(x2, force)
+    k0, k1, k2 = cross(v0, force), cross(v1, force), cross(v2, force)
+    b_r = (plus(v0, x0), plus(v1, x1), plus(v2, x2))
+    h0, h1, h2 = cross(a0, half), cross(a1, half), cross(a2, half)
+    e_r = (
+        (c0[0] + k0[0] + h0[0] + held * a0[0], c0[1] + k0[1] + h0[1] + held * a0[1],
+         c0[2] + k0[2] + h0[2] + held * a0[2]),
+        (c1[0] + k1[0] + h1[0] + held * a1[0], c1[1] + k1[1] + h1[1] + held * a1[1],
+         c1[2] + k1[2] + h1[2] + held * a1[2]),
+        (c2[0] + k2[0] + h2[0] + held * a2[0], c2[1] + k2[1] + h2[1] + held * a2[1],
+         c2[2] + k2[2] + h2[2] + held * a2[2]),
+    )  # fmt: skip
+    b_t = (_row(velocities, s, 3), _row(velocities, s, 4), _row(velocities, s, 5))
+    e_t = (cross(b_t[0], force), cross(b_t[1], force), cross(b_t[2], force))
+
+    # The step's own block: angles with angles, and angles (rows) with translations.
+    z = (frames[s, 0, 2], frames[s, 1, 2], frames[s, 2, 2])
+    z1 = (frames[s + 1, 0, 2], frames[s + 1, 1, 2], frames[s + 1, 2, 2])
+    pull = plus(cross(d, force), moment)
+    arm_pull = cross(arm, force)
+    x, y = _kept(local, s, 0), _kept(local, s, 3)
+    m0 = (0.5 * z[0], 0.5 * z[1], 0.5 * z[2])
+    m1, m2 = _kept(local, s, 6), _kept(local, s, 9)
+    tilt, roll = coordinates[s, 1], coordinates[s, 2]
+    tt, rt, rr = _bent(
+        tilt, roll, local[s, 12], local[s, 13], local[s, 14],
+        (dot(x, pull), dot(y, pull), dot(z, pull)),
+    )  # fmt: skip
+    mtt, mrt, mrr = _bent(
+        0.5 * tilt, 0.5 * roll, local[s, 15], local[s, 16], local[s, 17],
+        (dot(x, arm_pull), dot(y, arm_pull), dot(z, arm_pull)),
+    )  # fmt: skip
+    turn = cross(pull, minus(z, z1))
+    arm_turn = cross(arm_pull, z)
+    k_ = stiffness[s]
+    d_rr = (
+        (k_[0, 0] + 0.25 * dot(pull, cross(z, z1)) + dot(a0, c0) + held * dot(a0, a0)
+         + dot(m0, k0), 0.0, 0.0),
+        (k_[1, 0] + 0.25 * dot(turn, a1) + 0.5 * (dot(a0, c1) + dot(a1, c0))
+         + held * dot(a0, a1) + 0.25 * dot(arm_turn, m1) + 0.5 * (dot(m0, k1) + dot(m1, k0)),
+         k_[1, 1] + tt + dot(a1, c1) + held * dot(a1, a1) + 0.25 * mtt + dot(m1, k1), 0.0),
+        (k_[2, 0] + 0.25 * dot(turn, a2) + 0.5 * (dot(a0, c2) + dot(a2, c0))
+         + held * dot(a0, a2) + 0.25 * dot(arm_turn, m2) + 0.5 * (dot(m0, k2) + dot(m2, k0)),
+         k_[2, 1] + rt + 0.5 * (dot(a1, c2) + dot(a2, c1)) + held * dot(a1, a2)
+         + 0.25 * mrt + 0.5 * (dot(m1, k2) + dot(m2, k1)),
+         k_[2, 2] + rr + dot(a2, c2) + held * dot(a2, a2) + 0.25 * mrr + dot(m2, k2)),
+    )  # fmt: skip
+    d_rt = (
+        (k_[0, 3] + dot(m0, e_t[0]), k_[0, 4] + dot(m0, e_t[1]), k_[0, 5] + dot(m0, e_t[2])),
+        (k_[1, 3] + dot(m1, e_t[0]), k_[1, 4] + dot(m1, e_t[1]), k_[1, 5] + dot(m1, e_t[2])),
+        (k_[2, 3] + dot(m2, e_t[0]), k_[2, 4] + dot(m2, e_t[1]), k_[2, 5] + dot(m2, e_t[2])),
+    )
+    return (a0, a1, a2), b_r, e_r, b_t, e_t, d_rr, d_rt
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def factorise_rigid(
     slope: Any,
     stiffness: Any,
@@ -125,12 +218,7 @@ def factorise_rigid(
     :func:`dnacheck.equilibria.discrete.kernels.factorisation.factorise`, with six coordinates a
     step: ``slope`` is (N, 6), ``factors`` (N, RIGID_FACTOR_WIDTH).
     """
-    centres, frames = kinematics.centres, kinematics.frames
-    axes, velocities, local = kinematics.axes, kinematics.velocities, kinematics.local
     n = coordinates.shape[0]
-    force = (multipliers[0], multipliers[1], multipliers[2])
-    moment = (multipliers[3], multipliers[4], multipliers[5])
-    half = (0.5 * moment[0], 0.5 * moment[1], 0.5 * moment[2])
     zero = (0.0, 0.0, 0.0)
     # Running sums over steps, as in the factorisation for three angles.
     p = (zero, zero, zero)
@@ -148,71 +236,11 @@ def factorise_rigid(
                 factors[s, k] = 0.0
             continue
         held = shift * (n - s) / n
-        d = (
-            centres[n, 0] - centres[s + 1, 0],
-            centres[n, 1] - centres[s + 1, 1],
-            centres[n, 2] - centres[s + 1, 2],
+        a_r, b_r, e_r, b_t, e_t, d_rr, d_rt = step_block(
+            s, coordinates, kinematics, stiffness, multipliers, held
         )
-        arm = (
-            centres[s + 1, 0] - centres[s, 0],
-            centres[s + 1, 1] - centres[s, 1],
-            centres[s + 1, 2] - centres[s, 2],
-        )
-        a0, a1, a2 = _row(axes, s, 0), _row(axes, s, 1), _row(axes, s, 2)
-        v0, v1, v2 = _row(velocities, s, 0), _row(velocities, s, 1), _row(velocities, s, 2)
-        x0, x1, x2 = cross(a0, d), cross(a1, d), cross(a2, d)
-        c0, c1, c2 = cross(x0, force), cross(x1, force), cross(x2, force)
-        k0, k1, k2 = cross(v0, force), cross(v1, force), cross(v2, force)
-        b_r = (plus(v0, x0), plus(v1, x1), plus(v2, x2))
-        h0, h1, h2 = cross(a0, half), cross(a1, half), cross(a2, half)
-        e_r = (
-            (c0[0] + k0[0] + h0[0] + held * a0[0], c0[1] + k0[1] + h0[1] + held * a0[1],
-             c0[2] + k0[2] + h0[2] + held * a0[2]),
-            (c1[0] + k1[0] + h1[0] + held * a1[0], c1[1] + k1[1] + h1[1] + held * a1[1],
-             c1[2] + k1[2] + h1[2] + held * a1[2]),
-            (c2[0] + k2[0] + h2[0] + held * a2[0], c2[1] + k2[1] + h2[1] + held * a2[1],
-             c2[2] + k2[2] + h2[2] + held * a2[2]),
-        )  # fmt: skip
-        b_t = (_row(velocities, s, 3), _row(velocities, s, 4), _row(velocities, s, 5))
-        e_t = (cross(b_t[0], force), cross(b_t[1], force), cross(b_t[2], force))
-
-        # The step's own block: angles with angles, and angles (rows) with translations.
-        z = (frames[s, 0, 2], frames[s, 1, 2], frames[s, 2, 2])
-        z1 = (frames[s + 1, 0, 2], frames[s + 1, 1, 2], frames[s + 1, 2, 2])
-        pull = plus(cross(d, force), moment)
-        arm_pull = cross(arm, force)
-        x, y = _kept(local, s, 0), _kept(local, s, 3)
-        m0 = (0.5 * z[0], 0.5 * z[1], 0.5 * z[2])
-        m1, m2 = _kept(local, s, 6), _kept(local, s, 9)
-        tilt, roll = coordinates[s, 1], coordinates[s, 2]
-        tt, rt, rr = _bent(
-            tilt, roll, local[s, 12], local[s, 13], local[s, 14],
-            (dot(x, pull), dot(y, pull), dot(z, pull)),
-        )  # fmt: skip
-        mtt, mrt, mrr = _bent(
-            0.5 * tilt, 0.5 * roll, local[s, 15], local[s, 16], local[s, 17],
-            (dot(x, arm_pull), dot(y, arm_pull), dot(z, arm_pull)),
-        )  # fmt: skip
-        turn = cross(pull, minus(z, z1))
-        arm_turn = cross(arm_pull, z)
+        a0, a1, a2 = a_r
         k_ = stiffness[s]
-        d_rr = (
-            (k_[0, 0] + 0.25 * dot(pull, cross(z, z1)) + dot(a0, c0) + held * dot(a0, a0)
-             + dot(m0, k0), 0.0, 0.0),
-            (k_[1, 0] + 0.25 * dot(turn, a1) + 0.5 * (dot(a0, c1) + dot(a1, c0))
-             + held * dot(a0, a1) + 0.25 * dot(arm_turn, m1) + 0.5 * (dot(m0, k1) + dot(m1, k0)),
-             k_[1, 1] + tt + dot(a1, c1) + held * dot(a1, a1) + 0.25 * mtt + dot(m1, k1), 0.0),
-            (k_[2, 0] + 0.25 * dot(turn, a2) + 0.5 * (dot(a0, c2) + dot(a2, c0))
-             + held * dot(a0, a2) + 0.25 * dot(arm_turn, m2) + 0.5 * (dot(m0, k2) + dot(m2, k0)),
-             k_[2, 1] + rt + 0.5 * (dot(a1, c2) + dot(a2, c1)) + held * dot(a1, a2)
-             + 0.25 * mrt + 0.5 * (dot(m1, k2) + dot(m2, k1)),
-             k_[2, 2] + rr + dot(a2, c2) + held * dot(a2, a2) + 0.25 * mrr + dot(m2, k2)),
-        )  # fmt: skip
-        d_rt = (
-            (k_[0, 3] + dot(m0, e_t[0]), k_[0, 4] + dot(m0, e_t[1]), k_[0, 5] + dot(m0, e_t[2])),
-            (k_[1, 3] + dot(m1, e_t[0]), k_[1, 4] + dot(m1, e_t[1]), k_[1, 5] + dot(m1, e_t[2])),
-            (k_[2, 3] + dot(m2, e_t[0]), k_[2, 4] + dot(m2, e_t[1]), k_[2, 5] + dot(m2, e_t[2])),
-        )
 
         # What earlier steps leave: U = A - E P, W = B - E Q, D = own block - E P E^T.
         u_t = (

@@ -47,6 +47,7 @@ from dnacheck.model.rigid_kernels import (
     linearise_rigid,
     new_kinematics,
 )
+from dnacheck.numerics.curve_topology import edge_frames, link_of_ring
 
 
 class HingeState(NamedTuple):
@@ -93,9 +94,9 @@ class RigidState(NamedTuple):
         Angle of the end about a target's d3 that carries a torque.
     kinematics : RigidKinematics
     scales : ndarray, shape (N, 3)
-        By what the residuals of the translations count beside those of the angles: the root of
-        bending over translational stiffness, at most 1. The round-off of a stiff coordinate's
-        gradient is that of its strain times its stiffness.
+        By what the residuals of the translations count beside those of the angles: bending over
+        translational stiffness, at most 1. What counts of a stiff coordinate is how far it is from
+        rest; the round-off of its gradient is that of its strain times its stiffness.
     """
 
     angles: Any
@@ -156,7 +157,7 @@ def _new_rigid_state(steps: RigidSteps, boundary: Boundary) -> RigidState:
     for s in range(n):
         bend = 0.5 * (steps.stiffness[s, 1, 1] + steps.stiffness[s, 2, 2])
         for j in range(3):
-            scales[s, j] = min(1.0, math.sqrt(bend / steps.stiffness[s, 3 + j, 3 + j]))
+            scales[s, j] = min(1.0, bend / steps.stiffness[s, 3 + j, 3 + j])
     kinematics = new_kinematics(n)
     place_start(boundary, kinematics.centres[0], kinematics.frames[0])
     return RigidState(
@@ -322,6 +323,23 @@ def _replace_rigid(state: RigidState, factors: Any, rhs: Any, small: Any) -> Non
 
 replace_rhs = by_kind(_replace_hinges, _replace_rigid)
 """Forward substitution of another right-hand side: (state, factors, rhs, small)."""
+
+
+@njit(cache=True, nogil=True)
+def _hinge_link(state: HingeState) -> int:
+    return link_of_ring(state.centres, state.frames)[0]
+
+
+@njit(cache=True, nogil=True)
+def _rigid_link(state: RigidState) -> int:
+    kinematics = state.kinematics
+    along = np.empty(kinematics.frames.shape)
+    edge_frames(kinematics.centres, kinematics.frames, along)
+    return link_of_ring(kinematics.centres, along)[0]
+
+
+link_of = by_kind(_hinge_link, _rigid_link)
+"""Link of a closed ``state``."""
 
 
 @njit(cache=True, nogil=True)
