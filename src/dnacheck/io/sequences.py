@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from dnacheck.model.molecules import Molecule, embedded, embedded_names, is_embedded
+from dnacheck.model.par_files import is_par, read_par
 from dnacheck.model.sequence import parse_sequence
 from dnacheck.numerics.outcome import InputError
 
@@ -344,7 +345,8 @@ def read_target(target: str) -> Iterator[Molecule | InputError]:
     Parameters
     ----------
     target : str
-        Name of an embedded molecule, "-" for standard input, a FASTA or GenBank file, or letters.
+        Name of an embedded molecule, "-" for standard input, a FASTA or GenBank file, a shape in
+        3DNA's ``.par`` format, or letters.
 
     Raises
     ------
@@ -353,6 +355,9 @@ def read_target(target: str) -> Iterator[Molecule | InputError]:
     """
     if is_embedded(target):
         yield embedded(target)
+        return
+    if is_par(target):
+        yield read_par(Path(target))
         return
     looks_like_path = "/" in target or "." in target or "\\" in target
     try:

@@ -272,6 +272,25 @@ class Chain:
         return replace(self, stiffness=stiffness, twist_ratio=float(twist_ratio), guests=guests)
 
 
+def scaled_twist(chain: Chain, scale: float) -> Chain:
+    """The same chain with its twist stiffness so many times its own.
+
+    The twist's couplings change with the root of the scale, so that their correlations stay and
+    the stiffness stays positive.
+
+    Raises
+    ------
+    InputError
+        The scale is not positive.
+    """
+    if not (np.isfinite(scale) and scale > 0.0):
+        raise InputError(f"scale of the twist stiffness must be a positive number, not {scale}")
+    factors = np.ones(chain.ground.shape[1])
+    factors[0] = math.sqrt(scale)
+    stiffness = chain.stiffness * np.outer(factors, factors)
+    return replace(chain, stiffness=stiffness, twist_ratio=None)
+
+
 def uniform_stiffness(n_steps: int, twist_ratio: float) -> Array:
     """The paper's diagonal stiffness (twist_ratio, 1, 1) on every step, shape (n_steps, 3, 3).
 
@@ -363,6 +382,11 @@ def build_chain(
                     f"out the {name}"
                 )
         return _rigid_chain(molecule, table, rows, ground, regions)
+    if molecule.ground is not None:
+        raise InputError(
+            f"{molecule.name}: a shape of six parameters a step needs a set with six, such as "
+            f"olson1998; '{table.name}' has three angles"
+        )
     persistence_length_A = (
         PERSISTENCE_LENGTH_A if persistence_length_A is None else persistence_length_A
     )
@@ -403,6 +427,9 @@ def _rigid_chain(
     """Chain of rigid steps; its unit of length is the mean rise, its unit of energy RT."""
     if table.stiffness is None:
         raise InputError(f"parameter set '{table.name}' has no stiffness; six parameters need one")
+    if molecule.ground is not None:
+        own = np.isfinite(molecule.ground).all(axis=1)
+        ground[own] = molecule.ground[own]
     rise = float(ground[:, 5].mean())
     if not rise > 0.0:
         raise InputError(f"parameter set '{table.name}': the mean rise of the steps is {rise} Å")

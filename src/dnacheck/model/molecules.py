@@ -4,22 +4,37 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from dnacheck.model.a_tracts import Region, mirrored_region
 from dnacheck.model.data_files import data_directory
+from dnacheck.model.parameters import STRAND_SIGNS
 from dnacheck.model.sequence import Sequence, parse_sequence
 from dnacheck.numerics.outcome import InputError
 
 
 @dataclass(frozen=True)
 class Molecule:
-    """A sequence and, where it is known from data, the steps that take the A-tract twist."""
+    """A sequence and what is known of it from data.
+
+    Attributes
+    ----------
+    sequence : Sequence
+    a_tract_regions : tuple of (first, last), optional
+        Steps that take the A-tract twist.
+    ground : ndarray, shape (N, 6), optional
+        Unstressed shape of its own, in place of a parameter set's: twist, tilt, roll in radians,
+        shift, slide, rise in Å. A row that is not a number leaves the step to the set.
+    """
 
     sequence: Sequence
     a_tract_regions: tuple[Region, ...] | None = None
+    ground: NDArray[np.float64] | None = field(default=None, compare=False)
 
     @property
     def name(self) -> str:
@@ -33,9 +48,14 @@ class Molecule:
         strand, would move them by one step.
         """
         n = len(self.sequence)
+        ground = self.ground
+        if ground is not None:
+            # Step s of the other strand is step n - 2 - s, the last one n - 1, read backwards.
+            ground = np.roll(ground[::-1], -1, axis=0) * STRAND_SIGNS["rigid"]
         return Molecule(
             self.sequence.reverse_complement(),
             tuple(mirrored_region(region, n) for region in regions),
+            ground,
         )
 
 
