@@ -69,7 +69,7 @@ class RatioRange(click.ParamType):
     default="0.5:1.5:16",
     show_default=True,
     metavar="FIRST:LAST:NUMBER",
-    help="Twisting over bending stiffness.",
+    help="Twisting over bending stiffness; of six-parameter sets, what multiplies their twist's.",
 )
 @click.option(
     "--model",
@@ -116,6 +116,10 @@ def command(
                 raise molecule
             chain = dc.chain(molecule, **model.chain_arguments())
             for kind in models:
+                if kind == "continuum" and chain.rigid and which == "both":
+                    note("six parameters: the discrete rings alone are followed", run.quiet)
+                    advance(1)
+                    continue
                 if kind == "continuum":
                     rod = dc.rod(chain, **continuum.rod_arguments())
                     sweep = dc.twist_ratio_scan(

@@ -17,7 +17,7 @@ from dnacheck.equilibria.continuum.search import lowest_continuum_ring
 from dnacheck.equilibria.continuum.state import State, new_state, run_newton
 from dnacheck.equilibria.discrete.search import SearchOptions, find_rings
 from dnacheck.equilibria.discrete.solve import NewtonOptions, solve_ring
-from dnacheck.model.chain import Chain
+from dnacheck.model.chain import Chain, scaled_twist
 from dnacheck.model.rod.rod import Rod
 from dnacheck.numerics.curve_topology import polygon_writhe
 
@@ -140,7 +140,10 @@ class ContinuumModel:
 
 
 class DiscreteModel:
-    """Discrete rings of a chain with the uniform diagonal stiffness."""
+    """Discrete rings of a chain with the uniform diagonal stiffness, or of rigid steps.
+
+    The ratio of rigid steps, which bring stiffnesses of their own, multiplies their twist's.
+    """
 
     kind: Literal["continuum", "discrete"] = "discrete"
 
@@ -153,9 +156,14 @@ class DiscreteModel:
             tolerance=tolerance, minima_only=False, max_iterations=_MOST_ITERATIONS
         )
 
+    def _at(self, ratio: float) -> Chain:
+        if self.chain.rigid:
+            return scaled_twist(self.chain, ratio)
+        return self.chain.with_twist_ratio(ratio)
+
     def search(self, ratio: float) -> list[Minimum]:
         """Minima over links and registers."""
-        chain = self.chain.with_twist_ratio(ratio)
+        chain = self._at(ratio)
         search = find_rings(chain, SearchOptions(newton=self.newton))
         return [
             Minimum(
@@ -170,8 +178,8 @@ class DiscreteModel:
 
     def follow(self, ratio: float, guess: Array, like: Minimum) -> Minimum | None:
         """The minimum near a guess, or None."""
-        chain = self.chain.with_twist_ratio(ratio)
-        ring = solve_ring(chain, guess.reshape(-1, 3), self.warm, throw=False)
+        chain = self._at(ratio)
+        ring = solve_ring(chain, guess.reshape(chain.ground.shape), self.warm, throw=False)
         if not ring.status.ok or not ring.stable:
             return None
         unknowns = ring.angles.ravel()
