@@ -76,6 +76,7 @@ def chain(
     persistence_length_A: float | None = None,
     rise_A: float | None = None,
     step_form: StepForm = "wedge",
+    closed: bool = True,
 ) -> Chain:
     """Discrete chain of a molecule: a ground shape and a stiffness for every base-pair step.
 
@@ -96,6 +97,9 @@ def chain(
         Å; 463 and 3.4 by default. Not for six parameters.
     step_form : {"wedge", "midstep"}
         The paper's step, or its form symmetrised in the strands.
+    closed : bool
+        Whether the A-tract rule goes on across the first base pair, as in a ring, or stops at the
+        ends, as for a loop or a pulled molecule.
 
     Returns
     -------
@@ -125,6 +129,7 @@ def chain(
         "rise_A": positive_or_none("rise_A", rise_A),
         "a_tracts": a_tracts if isinstance(a_tracts, str) else _regions(a_tracts),
         "step_form": step_form,
+        "closed": closed,
     }
     item = molecule(target)
     try:

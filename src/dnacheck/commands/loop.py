@@ -75,7 +75,7 @@ def command(
     from dnacheck.model.segments import between
 
     molecule = read_one(target, "a loop")
-    chain = between(dc.chain(molecule, **model.chain_arguments()), *sites)
+    chain = between(dc.chain(molecule, **model.chain_arguments(), closed=False), *sites)
     position, rotation = read_pose(pose)
     search = dc.rings(chain, ends=dc.Loop(tuple(position), tuple(map(tuple, rotation))))
     results: list[JFactor] = []

@@ -55,7 +55,7 @@ def command(
     from dnacheck.numerics.outcome import InputError
 
     boundary = Pull(force, torque)
-    chain = dc.chain(read_one(target, "a pull"), **model.chain_arguments())
+    chain = dc.chain(read_one(target, "a pull"), **model.chain_arguments(), closed=False)
     search = find_equilibria(chain, boundary)
     if not search.equilibria:
         raise InputError(
