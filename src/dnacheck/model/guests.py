@@ -85,7 +85,7 @@ def bind(chain: Chain, site: int, steps: GuestSteps | str | Path | ArrayLike) ->
     >>> import dnacheck as dc
     >>> bound = dc.bind(dc.chain("11T15"), 60, "cap")
     >>> [guest.name for guest in bound.guests], bound.n_free < bound.n_steps
-    (['cap'], True)
+    (['CAP'], True)
     """
     guest = guest_steps(steps)
     n = chain.n_steps
