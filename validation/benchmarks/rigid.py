@@ -125,14 +125,16 @@ def long(count: int) -> None:
         link = round(chain.relaxed_turns)
         start = np.empty(chain.ground.shape)
         fill_start(chain.arrays, link, best_register(chain.arrays, link), start)
-        best = math.inf
+        whole = best = math.inf
         for _ in range(3):
             began = time.perf_counter()
             ring = solve_ring(chain, start, throw=False)
-            best = min(best, time.perf_counter() - began)
+            whole = min(whole, time.perf_counter() - began)
+            best = min(best, ring.seconds)
         print(
             f"{n} bp: {1e3 * best:.2f} ms, {ring.iterations} iterations, "
-            f"{1e9 * best / max(ring.iterations, 1) / n:.0f} ns a base pair and iteration, "
+            f"{1e9 * best / max(ring.iterations, 1) / n:.0f} ns a base pair and iteration; with "
+            f"link and writhe, whose exact sum is quadratic, {1e3 * whole:.2f} ms; "
             f"residual {ring.residual:.0e}"
         )
 
