@@ -118,7 +118,7 @@ def new_work(steps: Any) -> Work:
         np.empty(steps.ground.shape),
         np.empty(6),
         np.empty(N_FIGURES),
-        np.empty(3),
+        np.empty(2),
         np.empty((2, n + 1, 3)),
         np.empty((n, 3)),
         np.empty((n, 3)),
@@ -247,10 +247,10 @@ def _hinge_second(
     register = register_of(angles, work.along, work.across)[0]
     known = KnownRegister(work.along, work.across, register, REACH)
     ring = (work.trial, work.force, work.figure)
-    for k in range(3):
+    for k in range(2):
         if (k == 0 and count < 2) or (k > 0 and not lacking < LACKING):
             continue
-        start = work.registers[1 + k] if k < 2 else 1.5 * math.pi - register
+        start = work.registers[1] if k == 0 else 1.5 * math.pi - register
         code = from_planar(steps, link, start, work.turns, limits, known, ring)
         if code == CONVERGED and work.figure[NEGATIVES] == 0:
             return True

@@ -120,7 +120,7 @@ def _solutions(
         yield solve_ring(chain, chain.ground, newton, boundary=boundary, throw=False)
         return
     # The link only sets the excess twist: none, where the end is free to turn.
-    registers = np.empty(3)
+    registers = np.empty(2)
     turns = np.empty((2, chain.n_steps + 1, 3))
     count, lacking, _ = predicted_registers(chain.arrays, chain.relaxed_turns, registers, turns)
     chosen = [registers[0]]

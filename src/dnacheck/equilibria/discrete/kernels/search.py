@@ -47,7 +47,7 @@ REACH = 1.0
 # none predicted, and 22 of these lacked less than 0.0035.
 LACKING = 0.005
 # Starts that look for a second minimum of a link.
-_SECOND = 3
+_SECOND = 2
 # Where the first register of a link leads to no minimum, these are tried instead, in turns of it.
 _INSTEAD = (0.5, 0.25, 0.75)
 
@@ -139,7 +139,7 @@ _register_rows = by_kind(_hinge_rows, _rigid_rows)
 @njit(cache=True, nogil=True)
 def best_register(steps: Any, link: int) -> float:
     """Register of lowest predicted energy of the planar ring; see :func:`circle_registers`."""
-    rests = np.empty(3)
+    rests = np.empty(2)
     predicted_registers(steps, link, rests, np.empty((2, steps.ground.shape[0] + 1, 3)))
     return rests[0]
 
@@ -206,7 +206,7 @@ def search_as_cut(
     ring = (trial, force, figure)
     along, across = np.empty((n, 3)), np.empty((n, 3))
     nothing = KnownRegister(along, across, 0.0, -1.0)
-    rests = np.empty((count, 3))
+    rests = np.empty((count, 2))
     turns = np.empty((count, 2, n + 1, 3))
     choices = np.empty(count, dtype=np.int64)
     lacking = np.empty(count)
@@ -237,8 +237,9 @@ def search_as_cut(
             starts += 1
             code = from_planar(steps, link, start, turns[i], limits, nothing, ring)
             if code == CONVERGED and figure[NEGATIVES] == 0:
-                _register_rows(steps, link, along, across)
-                registers[i] = register_of(trial, along, across)[0]
+                if choices[i] > 1 or lacking[i] < LACKING:
+                    _register_rows(steps, link, along, across)
+                    registers[i] = register_of(trial, along, across)[0]
                 energies[i] = figure[ENERGY]
                 lowest = min(lowest, figure[ENERGY])
                 found = _keep(trial, force, figure, found, minima)
@@ -248,7 +249,9 @@ def search_as_cut(
         if not energies[i] <= lowest + plan.window:
             continue
         link = plan.links[i]
-        reach = _register_rows(steps, link, along, across)
+        reach = -1.0
+        if choices[i] > 1 or lacking[i] < LACKING:
+            reach = _register_rows(steps, link, along, across)
         known = KnownRegister(along, across, registers[i], reach)
         second = False
         further = plan.registers.shape[0] if energies[i] <= lowest + plan.near else 0
@@ -258,10 +261,6 @@ def search_as_cut(
                     continue
                 start = rests[i, 1]
             elif k == 1:
-                if second or not lacking[i] < LACKING:
-                    continue
-                start = rests[i, 2]
-            elif k == 2:
                 if second or not lacking[i] < LACKING:
                     continue
                 # A planar ring rolled by psi has the register pi/2 - psi.

@@ -25,7 +25,7 @@ _HELD = 0.02
 # Relaxing turns no frame of a starting shape by more than this, in radians.
 _LARGEST_TURN = 0.5
 # Where it would turn one by more than this, the first order is no guide to the energy.
-_RELIABLE_TURN = 1.0
+_RELIABLE_TURN = 2.0
 # Registers so far (rad) from the lowest predicted one may hold another minimum.
 _AWAY = 1.2
 
@@ -105,17 +105,16 @@ def circle_registers(
 
     Parameters
     ----------
-    registers : (3,), filled with the minima, in radians, and with the shoulder: where, away from
-        the lowest, the curve comes nearest to another minimum.
+    registers : (2,), filled with the minima, in radians.
     turns : (2, N+1, 3), filled with the rotation vectors by which the frames of the planar ring
         relax at registers 0 and pi/2, to first order, in the axes of :func:`circle_frames`.
 
     Returns
     -------
     count : number of minima, 1 or 2.
-    lacking : what the curve lacks of a minimum at the shoulder, relative to a circle's energy: the
-        least amplitude of a further term that could make one, were its slope at most three and
-        its curvature six times as large.
+    lacking : what the curve lacks of another minimum away from the lowest, relative to a circle's
+        energy: the least amplitude of a further term that could make one, were its slope at most
+        three and its curvature six times as large.
     energy : predicted for the lowest, reduced; NaN near the instability of a twisted ring, where
         the first order is no guide.
     """
@@ -151,9 +150,8 @@ def circle_registers(
             depths[count] = e1
             count += 1
         away = abs(wrapped(2.0 * math.pi * (k - lowest) / _SAMPLES))
-        if away > _AWAY and lacks[k] < lacking:
-            registers[2] = 2.0 * math.pi * k / _SAMPLES
-            lacking = lacks[k]
+        if away > _AWAY:
+            lacking = min(lacking, lacks[k])
     if count == 0:
         registers[0] = 0.0
         count = 1
