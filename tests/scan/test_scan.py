@@ -315,3 +315,16 @@ def test_numbers_are_finite(library, tmp_path):
     scan(library, output)
     for row in rows_of(output):
         assert all(math.isfinite(float(row[key])) for key in COLUMNS[1:-2])
+
+
+def test_laplace_alone_is_said(library, tmp_path):
+    output = tmp_path / "out.csv"
+    scan(library, output, ScanOptions(laplace=True))
+    rows = rows_of(output)
+    assert {row["quality"] for row in rows if row["status"] == STATUS_FOUND} == {"laplace only"}
+    record = next(SequenceSource(library).records())
+    search = find_rings(build_chain(record.molecule()))
+    expected = -np.logaddexp.reduce([laplace_log_j(ring) for ring in search.equilibria])
+    assert float(rows[0]["minus_lnJ"]) == pytest.approx(expected, abs=1e-5)
+    with pytest.raises(InputError, match="other laplace"):
+        scan(library, output)

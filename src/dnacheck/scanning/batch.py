@@ -86,11 +86,14 @@ class Plan:
         Keyword arguments of :func:`dnacheck.model.chain.build_chain`.
     options : WindowOptions, optional
         None scans whole records.
+    laplace : bool
+        Leave J of records at Laplace's value; that of windows is.
     """
 
     source: SequenceSource
     arguments: dict[str, Any]
     options: pc.WindowOptions | None = None
+    laplace: bool = False
     _lengths: list[tuple[str, int]] = field(default_factory=list, repr=False)
 
     @classmethod
@@ -99,6 +102,7 @@ class Plan:
         source: SequenceSource | Path | str,
         arguments: dict[str, Any],
         options: pc.WindowOptions | None = None,
+        laplace: bool = False,
     ) -> Plan:
         """Read the input once and check that there is something to do.
 
@@ -111,7 +115,7 @@ class Plan:
         found = pc.lengths(source)
         if options is not None:
             pc.window_count(found, options)
-        return cls(source, pc.plain_arguments(arguments), options, found)
+        return cls(source, pc.plain_arguments(arguments), options, laplace, found)
 
     @property
     def rows(self) -> int:
@@ -137,11 +141,13 @@ class Plan:
         if self.options is not None:
             region = self.options.region
             found |= asdict(self.options) | {"region": asdict(region) if region else None}
+        elif self.laplace:
+            found["laplace"] = True
         return found
 
     def estimate(self, outputs: Sequence[Path], workers: int) -> dict[str, Any]:
         """Rows, seconds and bytes to expect, from a short sample computed now."""
-        settings = pc.Settings(self.arguments, self.options)
+        settings = pc.Settings(self.arguments, self.options, self.laplace)
         first = next(p for p in self.pieces() if not p.failure)
         if self.options is not None:
             reach = (_SAMPLE_WINDOWS - 1) * self.options.step + self.options.window
@@ -222,7 +228,7 @@ def run(
                 progress(done["rows"])
 
     with crew(processes, workers, scheduler) as team:
-        shared = pc.Settings(plan.arguments, plan.options)
+        shared = pc.Settings(plan.arguments, plan.options, plan.laplace)
         for result in team.run(shared, missing()):
             done = store.write(result)
             total.update(done)

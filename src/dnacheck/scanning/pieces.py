@@ -113,6 +113,7 @@ class Settings(NamedTuple):
 
     arguments: Mapping[str, Any]
     options: WindowOptions | None
+    laplace: bool = False
 
 
 class Result(NamedTuple):
@@ -314,7 +315,10 @@ def _failed_record(piece: Piece) -> Result:
 
 
 def _record_rows(settings: Settings, piece: Piece) -> Result:
-    rows = [scan_row(name, letters, settings.arguments) for name, letters in piece.records]
+    rows = [
+        scan_row(name, letters, settings.arguments, laplace=settings.laplace)
+        for name, letters in piece.records
+    ]
     columns: dict[str, Any] = {}
     for k, name in enumerate(COLUMNS):
         cells = [row[k] for row in rows]

@@ -171,7 +171,7 @@ def mark_tracts(letters: Any, tables: StepTables, inside: Any) -> None:
         return
     for r in range(runs):
         nearest = first_of[(r + 1) % runs] + (n if r + 1 == runs else 0)
-        joined = runs > 1 and nearest - last_of[r] - 1 <= tables.gap
+        joined = nearest - last_of[r] - 1 <= tables.gap
         to = nearest if joined else last_of[r] + tables.flank
         for k in range(first_of[r] - tables.flank, to + 1):
             inside[(begin + k) % n] = True
