@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dnacheck.cyclization.laplace.isolated import laplace_log_j
 from dnacheck.cyclization.laplace.quick import quick_j
 from dnacheck.cyclization.methods import ClosureSampling, Laplace
 from dnacheck.equilibria.discrete.search import find_rings
