@@ -47,7 +47,8 @@ def rows(found, table):
 
 @pytest.mark.parametrize("quantity", Wanted.model_fields)
 def test_every_quantity_that_can_be_wanted_is_computed(quantity, tmp_path):
-    name = "bound.ratios" if quantity == "binding" else f"wanted.{quantity}"
+    chapters = {"binding": "bound.ratios", "rigid_ln_J": "rigid.molecules"}
+    name = chapters.get(quantity, f"wanted.{quantity}")
     assert name in chosen(scene_of(tmp_path, f"{quantity} = 0.1"), Level.QUICK)
 
 

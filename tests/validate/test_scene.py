@@ -149,7 +149,7 @@ TABLES = {
     "molecules": ("embedded", "fasta", "sequences", "homopolymers", "random"),
     "model": ("angles", "twist_ratios", "persistence_length_A", "rise_A", "a_tracts"),
     "continuum": ("filter_width", "intervals", "degree", "padding"),
-    "wanted": ("energy", "continuum_energy", "shape_A", "ln_J", "thermal_energy"),
+    "wanted": ("energy", "continuum_energy", "shape_A", "ln_J", "thermal_energy", "rigid_ln_J"),
     "checks": ("groups", "hard_cases", "against_paper", "compare_methods"),
 }
 SHOWN = st.one_of(

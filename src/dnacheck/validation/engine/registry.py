@@ -27,6 +27,7 @@ GROUP_MODULES = (
     "continuum",
     "sweeps",
     "jfactors",
+    "rigid",
     "bound",
     "bead_chain",
     "speed",

@@ -17,6 +17,7 @@ from dnacheck.validation.plots import (
     continuation,
     curves,
     mechanics,
+    rigid,
     rod,
     shapes,
 )
@@ -46,6 +47,7 @@ KINDS: dict[str, tuple[Panel, ...]] = {
     "named_lines": (curves.named_lines,),
     "binding": (binding.free_to_bound,),
     "fitted": (mechanics.fitted,),
+    "rigid_ln_J": (rigid.ln_J_by_set,),
     "fluctuation": (bead_chain.fluctuation,),
     "bead_ring": (bead_chain.ring_from_above, bead_chain.ring_from_the_side),
     "sweep_energy": (_sweep("energy"),),

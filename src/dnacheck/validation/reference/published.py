@@ -46,6 +46,21 @@ class PublishedFreeEnergy:
         return self.experiment - self.minus_monte_carlo
 
 
+RIGID_RINGS_SOURCE = (
+    "minima by an independent program: El Hassan–Calladine steps, gradient descent, two starting "
+    "registers a sequence; Olson et al., PNAS 95, 11163 (1998), made strand-symmetric"
+)
+
+
+@dataclass(frozen=True)
+class PublishedRigidRing:
+    """A closed ring of rigid base-pair steps, the last pair held on the first."""
+
+    link: int
+    energy_kT: float
+    letters: str
+
+
 def _rows(file: str) -> list[dict[str, str]]:
     with (data_directory() / "published" / file).open(encoding="utf-8", newline="") as handle:
         return list(csv.DictReader(line for line in handle if not line.startswith("#")))
@@ -56,6 +71,15 @@ def cap_ring_binding() -> tuple[float, float]:
     """Binding constant of CAP on C-shaped rings over that on linear molecules, and ln's error."""
     (row,) = _rows("cap_ring_binding.csv")
     return float(row["ratio"]), float(row["ln_sigma"])
+
+
+@cache
+def rigid_rings() -> tuple[PublishedRigidRing, ...]:
+    """Rings of random sequences by another program; see ``RIGID_RINGS_SOURCE``."""
+    return tuple(
+        PublishedRigidRing(int(row["link"]), float(row["energy_kT"]), row["sequence"])
+        for row in _rows("rigid_base_pair_rings.csv")
+    )
 
 
 @cache

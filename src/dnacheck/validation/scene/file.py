@@ -176,13 +176,14 @@ class _Reader:
                     "wanted",
                     name,
                 )
-        if wanted.ln_J is not None and wanted.ln_J < FINEST_LN_J:
-            raise self.fail(
-                f"an error of {wanted.ln_J:g} on ln J needs more sampling than a report can "
-                f"wait for; ask for {FINEST_LN_J:g} or more",
-                "wanted",
-                "ln_J",
-            )
+        for name, value in (("ln_J", wanted.ln_J), ("rigid_ln_J", wanted.rigid_ln_J)):
+            if value is not None and value < FINEST_LN_J:
+                raise self.fail(
+                    f"an error of {value:g} on ln J needs more sampling than a report can "
+                    f"wait for; ask for {FINEST_LN_J:g} or more",
+                    "wanted",
+                    name,
+                )
         if wanted.thermal_energy is not None and wanted.thermal_energy < FINEST_THERMAL_ENERGY:
             raise self.fail(
                 f"a relative accuracy of {wanted.thermal_energy:g} of a mean energy needs more "

@@ -88,6 +88,8 @@ class Wanted(_Part):
     thermal_energy: Positive | None = None
     binding: Positive | None = None
     """Absolute error of ln of the ratio of binding constants, ring over linear; see Guest."""
+    rigid_ln_J: Positive | None = None
+    """Absolute error of -ln J by rigid base-pair steps, with the rings of another program."""
 
 
 class Guest(_Part):
