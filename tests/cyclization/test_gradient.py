@@ -11,6 +11,7 @@ from dnacheck.cyclization.laplace.isolated import laplace
 from dnacheck.cyclization.methods import ClosureSampling
 from dnacheck.model.chain import Chain, build_chain
 from dnacheck.model.molecules import embedded
+from dnacheck.model.named_parameters import modified_chain, own_value
 from dnacheck.numerics.outcome import InputError
 
 SEEDS = range(6)
@@ -84,7 +85,7 @@ def test_central_differences_with_common_random_numbers(chain, name):
         for s in SEEDS
     ]
     spread = np.std(differences, ddof=1) / math.sqrt(len(differences))
-    gradient = log_j_gradient(chain, FIXED, rng=99, tolerance=10.0).gradient
+    gradient = log_j_gradient(chain, FIXED, rng=99, tolerance=10.0).derivatives
     value, stderr = gradient.along(ground, stiffness)
     assert stderr > 0.0
     # 3.5: six parameters are compared, and six seeds give the spread.
@@ -99,15 +100,14 @@ def stiff_ring(factor):
     phase = np.cumsum(ground[:, 0])
     ground[:, 1] -= 0.4 * np.cos(phase)
     ground[:, 2] -= 0.4 * np.sin(phase)
-    stiffness = np.tile(np.diag([1.5, 1.0, 1.2]), (n, 1, 1))
-    length = factor * 463.0
-    return Chain("stiff", ground, stiffness, persistence_length_A=length)
+    stiffness = factor * np.tile(np.diag([1.5, 1.0, 1.2]), (n, 1, 1))
+    return Chain("stiff", ground, stiffness)
 
 
 def test_the_limit_of_a_stiff_chain_of_twelve_steps():
     """There Laplace is exact, and so are its central differences."""
     chain = stiff_ring(1000.0)
-    gradient = log_j_gradient(chain, ClosureSampling(), rng=1, tolerance=1e-3).gradient
+    gradient = log_j_gradient(chain, ClosureSampling(), rng=1, tolerance=1e-3).derivatives
     pulls, per_stiffness = np.empty((12, 3)), np.empty((12, 3))
     for s in range(12):
         for i in range(3):
@@ -132,7 +132,7 @@ def test_the_limit_of_a_stiff_chain_of_twelve_steps():
 
 def test_a_wrong_sign_would_be_seen(chain):
     """Negative control: the derivative along the ring's own strain is far from zero."""
-    gradient = log_j_gradient(chain, FIXED, rng=2, tolerance=10.0).gradient
+    gradient = log_j_gradient(chain, FIXED, rng=2, tolerance=10.0).derivatives
     strain = gradient.ground / chain.energy_scale_RT
     value, stderr = gradient.along(strain)
     assert value > 30.0 * stderr
@@ -142,17 +142,17 @@ def test_the_same_draws_give_j_with_and_without_its_gradient(chain):
     plain = ClosureSampling().compute(chain, rng=3, tolerance=0.05)
     with_gradient = ClosureSampling(gradient=True).compute(chain, rng=3, tolerance=0.05)
     draws = closed_draws(chain, rng=3, tolerance=0.05)
-    assert plain.gradient is None
+    assert plain.derivatives is None
     assert with_gradient.minus_lnJ == plain.minus_lnJ == draws.result.minus_lnJ
     assert draws.weights.sum() == pytest.approx(1.0, abs=1e-12)
     stiffness = chain.energy_scale_RT * chain.stiffness
     mean, errors = draws.average(np.einsum("sij,dsj->dsi", stiffness, draws.strains))
     scale = np.abs(mean).max()
-    np.testing.assert_allclose(mean, with_gradient.gradient.ground, atol=1e-9 * scale)
-    np.testing.assert_allclose(errors, with_gradient.gradient.ground_stderr, rtol=0.4)
+    np.testing.assert_allclose(mean, with_gradient.derivatives.ground, atol=1e-9 * scale)
+    np.testing.assert_allclose(errors, with_gradient.derivatives.ground_stderr, rtol=0.4)
     square = np.einsum("dsi,dsj->dsij", draws.strains, draws.strains)
     by_draws = 0.5 * (np.linalg.inv(stiffness) - draws.average(square)[0])
-    found = with_gradient.gradient.stiffness
+    found = with_gradient.derivatives.stiffness
     np.testing.assert_allclose(found, by_draws, atol=1e-9 * np.abs(found).max())
 
 
@@ -161,7 +161,7 @@ def test_errors_cover_the_spread_over_seeds(chain):
     scale = chain.energy_scale_RT * chain.stiffness
     values, errors = zip(
         *(
-            log_j_gradient(chain, FIXED, rng=s, tolerance=10.0).gradient.along(stiffness=scale)
+            log_j_gradient(chain, FIXED, rng=s, tolerance=10.0).derivatives.along(stiffness=scale)
             for s in range(40)
         ),
         strict=True,
@@ -183,6 +183,28 @@ def test_every_shape_that_is_drawn_closes(chain):
 
 
 def test_a_derivative_of_another_shape_is_refused(chain):
-    gradient = log_j_gradient(chain, FIXED, tolerance=10.0).gradient
+    gradient = log_j_gradient(chain, FIXED, tolerance=10.0).derivatives
     with pytest.raises(InputError, match="ground must have the shape"):
         gradient.along(np.ones(3))
+
+
+def test_gradient_by_name_is_the_slope_of_j():
+    """Common random numbers: the same draws, at the ends of a difference."""
+    chain = build_chain(embedded("09T15"))
+    method = ClosureSampling(gradient=True)
+    found = method.compute(chain, rng=5, tolerance=0.01).gradient(["bend_scale", "twist_ratio"])
+    for name, width in (("bend_scale", 0.02), ("twist_ratio", 0.05)):
+        own = own_value(chain, name)
+        ends = [
+            ClosureSampling().compute(
+                modified_chain(chain, {name: own + s * width}), rng=5, tolerance=0.01
+            )
+            for s in (1.0, -1.0)
+        ]
+        slope = (ends[1].minus_lnJ - ends[0].minus_lnJ) / (2.0 * width)
+        value, error = found[name]
+        assert abs(value - slope) < 3.0 * np.hypot(error, 0.5 * 0.01 / width)
+    with pytest.raises(InputError, match="gradient=True"):
+        ends[0].gradient("bend_scale")
+    with pytest.raises(InputError, match="is unknown"):
+        method.compute(chain, rng=5, tolerance=0.1).gradient("stiffnes")

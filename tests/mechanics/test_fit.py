@@ -6,11 +6,11 @@ import pytest
 from dnacheck.cyclization.gradient import closed_draws
 from dnacheck.mechanics.fit import FitOptions, Prior, fit_mechanics
 from dnacheck.mechanics.measurements import Measurement, read_measurements
-from dnacheck.mechanics.parameters import modified_chain
 from dnacheck.mechanics.posterior import design, posterior, profile_likelihood
 from dnacheck.mechanics.profile import changed_length
 from dnacheck.model.chain import build_chain
 from dnacheck.model.molecules import embedded
+from dnacheck.model.named_parameters import modified_chain
 from dnacheck.numerics.outcome import InputError
 
 TRUE = {"persistence_length_A": 500.0, "twist_offset_deg": -0.08}

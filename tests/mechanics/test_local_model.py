@@ -8,9 +8,9 @@ import pytest
 from dnacheck.cyclization.gradient import closed_draws
 from dnacheck.cyclization.methods import Laplace
 from dnacheck.mechanics.local_model import local_model
-from dnacheck.mechanics.parameters import modified_chain, own_value
 from dnacheck.model.chain import build_chain
 from dnacheck.model.molecules import Molecule, embedded
+from dnacheck.model.named_parameters import modified_chain, own_value
 from dnacheck.model.sequence import parse_sequence
 
 WIDTHS = {

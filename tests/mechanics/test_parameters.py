@@ -5,14 +5,14 @@ import math
 import numpy as np
 import pytest
 
-from dnacheck.mechanics.parameters import (
+from dnacheck.model.chain import build_chain
+from dnacheck.model.molecules import embedded
+from dnacheck.model.named_parameters import (
     chain_derivatives,
     modified_chain,
     own_value,
     unit,
 )
-from dnacheck.model.chain import build_chain
-from dnacheck.model.molecules import embedded
 from dnacheck.numerics.outcome import InputError
 
 NAMES = (

@@ -6,11 +6,11 @@ from scipy.stats import spearmanr
 
 from dnacheck.cyclization.gradient import closed_draws
 from dnacheck.cyclization.methods import ClosureSampling, Laplace
-from dnacheck.mechanics.parameters import modified_chain
 from dnacheck.mechanics.profile import changed_length, length_profile, read_measured_profile
 from dnacheck.mechanics.sensitivity import sensitivity_of
 from dnacheck.model.chain import build_chain
 from dnacheck.model.molecules import Molecule, embedded
+from dnacheck.model.named_parameters import modified_chain
 from dnacheck.model.sequence import parse_sequence
 from dnacheck.numerics.outcome import InputError
 

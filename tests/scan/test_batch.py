@@ -224,7 +224,7 @@ def test_records_go_to_parquet_as_they_go_to_csv(genome, tmp_path):
     ("options", "message"),
     [
         (["--window", "500"], "longer than every record"),
-        (["--window", "100", "--step", "0"], "step 0"),
+        (["--window", "100", "--step", "0"], "give an integer from 1"),
         (["--window", "100", "--region", "chrX:1-200"], "no record is called 'chrX'"),
         (["--window", "100", "--region", "chrI:1-9000"], "ends at base pair 420"),
         (["--step", "5"], "add --window"),
@@ -232,7 +232,7 @@ def test_records_go_to_parquet_as_they_go_to_csv(genome, tmp_path):
         (["-o", "out.bedgraph", "-o", "out.csv"], "add --window"),
         (
             ["--window", "99", "-o", "other.csv"],
-            "with other a_tracts, step, window",
+            "with other a_tracts, step, step_form, window",
         ),
         (["--window", "99", "-o", "taken.csv"], "is no unfinished scan"),
         (["--window", "100", "-o", "missing/out.csv"], "writable directory"),

@@ -17,12 +17,12 @@ from dnacheck.cyclization.methods import Auto, ClosureSampling
 from dnacheck.mechanics.fit import FitOptions, fit_mechanics
 from dnacheck.mechanics.local_model import local_model
 from dnacheck.mechanics.measurements import Measurement
-from dnacheck.mechanics.parameters import modified_chain, own_value
 from dnacheck.mechanics.posterior import profile_likelihood
 from dnacheck.mechanics.profile import changed_length, length_profile
 from dnacheck.mechanics.sensitivity import sensitivity_of
 from dnacheck.model.chain import build_chain
 from dnacheck.model.molecules import Molecule, embedded, embedded_names
+from dnacheck.model.named_parameters import modified_chain, own_value
 from dnacheck.model.sequence import parse_sequence
 from dnacheck.validation.reference.table3 import published_table
 from dnacheck.validation.reference.wormlike_chain import chain_rod_j

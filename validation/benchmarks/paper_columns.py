@@ -16,9 +16,9 @@ import itertools
 import numpy as np
 
 from dnacheck.equilibria.discrete.search import find_rings
-from dnacheck.mechanics.parameters import chain_derivatives, modified_chain, own_value
 from dnacheck.model.chain import build_chain
 from dnacheck.model.molecules import embedded
+from dnacheck.model.named_parameters import chain_derivatives, modified_chain, own_value
 from dnacheck.model.sequence import STEP_NAMES, reverse_complement
 from dnacheck.validation.reference.table3 import published_table
 

@@ -114,7 +114,7 @@ def _registers() -> None:
 
 def _cut() -> None:
     from dnacheck.equilibria.discrete.kernels.cut import roll_back, rotated
-    from dnacheck.model.cut import least_rotation
+    from dnacheck.model.cut_kernels import least_rotation
 
     chain, _, ring, _, _, _ = _search_arguments()
     rotated(chain.arrays, least_rotation(chain.arrays))

@@ -19,7 +19,7 @@ from the batches of the chained derivative, correlations between steps included.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -31,6 +31,7 @@ from dnacheck.cyclization.closure.sampling import ClosureSampler, Draws
 from dnacheck.cyclization.method import DEFAULT_TOLERANCE, Run, register_profile_of
 from dnacheck.cyclization.result import JFactor
 from dnacheck.model.chain import Chain
+from dnacheck.model.named_parameters import chain_derivatives, own_value
 from dnacheck.numerics.outcome import InputError
 from dnacheck.numerics.seeds import Randomness
 from dnacheck.numerics.statistics import batch_error
@@ -60,6 +61,7 @@ class LogJGradient:
     log_j_batches : ndarray, shape (B,)
         The same batches' deviations of ln J from its estimate, for the correlation of a derivative
         with J itself.
+    chain : Chain
     """
 
     ground: Array
@@ -67,6 +69,7 @@ class LogJGradient:
     ground_batches: Array = field(repr=False)
     stiffness_batches: Array = field(repr=False)
     log_j_batches: Array = field(repr=False)
+    chain: Chain = field(repr=False)
 
     @property
     def ground_stderr(self) -> Array:
@@ -77,6 +80,20 @@ class LogJGradient:
     def stiffness_stderr(self) -> Array:
         """Standard errors (N, d, d) of ``stiffness``."""
         return _errors(self.stiffness_batches)
+
+    def with_respect_to(self, names: Sequence[str]) -> dict[str, tuple[float, float]]:
+        """Derivatives by named parameters at the chain's own values, with standard errors.
+
+        Raises
+        ------
+        InputError
+            The chain has no such parameter.
+        """
+        values = {name: own_value(self.chain, name) for name in names}
+        moves = chain_derivatives(self.chain, list(names), values)
+        return {
+            name: self.along(moves.ground[i], moves.stiffness[i]) for i, name in enumerate(names)
+        }
 
     def along(
         self, ground: ArrayLike | None = None, stiffness: ArrayLike | None = None
@@ -135,6 +152,7 @@ class Moments:
     """
 
     def __init__(self, chain: Chain) -> None:
+        self.chain = chain
         self.stiffness = chain.energy_scale_RT * np.asarray(chain.stiffness)
         n, d = chain.ground.shape
         self.weight = np.zeros(_MOST_GROUPS)
@@ -185,6 +203,7 @@ class Moments:
             ground_batches=pulls,
             stiffness_batches=per_stiffness,
             log_j_batches=rate / rate.mean() - 1.0,
+            chain=self.chain,
         )
 
 
@@ -243,7 +262,7 @@ def log_j_gradient(
     tolerance: float = DEFAULT_TOLERANCE,
     max_seconds: float = float("inf"),
 ) -> JFactor:
-    """J factor with :attr:`JFactor.gradient`, from the same draws.
+    """J factor with derivatives, from the same draws.
 
     Parameters
     ----------

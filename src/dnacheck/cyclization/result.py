@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 import html
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -124,7 +125,7 @@ class JFactor:
         Why this method, where it was chosen.
     tried : tuple of Attempt
         What was tried before it, and it itself.
-    gradient : LogJGradient or None
+    derivatives : LogJGradient or None
         Derivatives of ln J, where the method was asked for them.
     """
 
@@ -143,7 +144,7 @@ class JFactor:
     status: JStatus = JStatus.CONVERGED
     reason: str = ""
     tried: tuple[Attempt, ...] = ()
-    gradient: LogJGradient | None = field(default=None, compare=False)
+    derivatives: LogJGradient | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         if math.isnan(self.minus_lnJ) or not self.stderr >= 0.0:
@@ -166,6 +167,33 @@ class JFactor:
         if self.status is JStatus.NO_ERROR_ESTIMATE and self.bias_bound is None:
             return math.inf
         return math.hypot(self.stderr, self.bias_bound or 0.0)
+
+    def gradient(self, wrt: str | Sequence[str]) -> dict[str, tuple[float, float]]:
+        """Derivatives of ln J with respect to named parameters, from the draws that gave J.
+
+        Parameters
+        ----------
+        wrt : str or sequence of str
+            Names of :mod:`dnacheck.model.named_parameters`: ``persistence_length_A``,
+            ``twist_ratio``, ``twist_offset_deg``, ``bend_scale``, ``a_tract_twist_deg``, table
+            entries such as ``theta[AG]`` ...
+
+        Returns
+        -------
+        dict of (value, stderr)
+            Per unit of each parameter.
+
+        Raises
+        ------
+        InputError
+            The method kept no derivatives, or the chain has no such parameter.
+        """
+        if self.derivatives is None:
+            raise InputError(
+                f"{self.method} kept no derivatives of J; ask for them with "
+                "method=dnacheck.ClosureSampling(gradient=True)"
+            )
+        return self.derivatives.with_respect_to([wrt] if isinstance(wrt, str) else wrt)
 
     def of_link(self, link: int, tolerance: float = math.inf) -> JFactor:
         """The part of J at one link, with its own error.
@@ -204,7 +232,7 @@ class JFactor:
             stderr=share.stderr,
             bias_bound=bias,
             links=(share,),
-            gradient=None,
+            derivatives=None,
         )
         if self.status is JStatus.CONVERGED and part.total_error > tolerance:
             return replace(part, status=JStatus.TOLERANCE_NOT_MET)

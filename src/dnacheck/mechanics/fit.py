@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from dnacheck.cyclization.gradient import closed_draws
 from dnacheck.mechanics.local_model import LocalModel, local_model
 from dnacheck.mechanics.measurements import Measurement
-from dnacheck.mechanics.parameters import (
+from dnacheck.model.chain import Chain
+from dnacheck.model.named_parameters import (
     checked_name,
     is_offset,
     modified_chain,
@@ -27,7 +28,6 @@ from dnacheck.mechanics.parameters import (
     own_value,
     unit,
 )
-from dnacheck.model.chain import Chain
 from dnacheck.numerics.outcome import InputError, SolveError
 
 Array = NDArray[np.float64]
@@ -353,7 +353,7 @@ def fit_mechanics(
     chains : sequence of Chain
         The molecules' own chains, in the same order.
     free : sequence of str
-        Parameters to fit, see :mod:`dnacheck.mechanics.parameters`.
+        Parameters to fit, see :mod:`dnacheck.model.named_parameters`.
     priors : mapping of str to Prior, optional
     progress : callable, optional
         Called after each iteration with its number and the rms residual.

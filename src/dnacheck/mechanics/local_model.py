@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dnacheck.cyclization.gradient import ClosedDraws
-from dnacheck.mechanics.parameters import ChainDerivatives, chain_derivatives, modified_chain
 from dnacheck.model.chain import Chain
+from dnacheck.model.named_parameters import ChainDerivatives, chain_derivatives, modified_chain
 
 Array = NDArray[np.float64]
 

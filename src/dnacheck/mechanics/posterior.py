@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from dnacheck.cyclization.gradient import closed_draws
 from dnacheck.mechanics.fit import MechanicsFit, plausible_range
 from dnacheck.mechanics.local_model import local_model
-from dnacheck.mechanics.parameters import modified_chain
 from dnacheck.model.chain import Chain
+from dnacheck.model.named_parameters import modified_chain
 from dnacheck.numerics.outcome import InputError
 
 Array = NDArray[np.float64]

@@ -12,28 +12,15 @@ from dnacheck.equilibria.discrete.kernels.cut import fill_shape
 from dnacheck.equilibria.discrete.kernels.newton import (
     ENERGY,
     LOG_DET_KKT,
-    N_FIGURES,
     NEUTRAL,
     NewtonLimits,
 )
 from dnacheck.equilibria.discrete.kernels.search import Minima, SearchPlan, search_as_cut
-from dnacheck.equilibria.discrete.search import room
 from dnacheck.numerics.curve_topology import edge_frames, link_of_ring
 
 # Positions of the figures of a scanned molecule.
 LOWEST_ENERGY, LOWEST_LINK, LOG_J, MINIMA, FAILED_STARTS, FREE_REGISTERS = range(6)
 N_SCAN_FIGURES = 6
-
-
-def room_for(plan: SearchPlan, n_steps: int, coordinates: int) -> Minima:
-    """Room for the minima of one molecule."""
-    most = room(plan)
-    return Minima(
-        np.empty((most, n_steps, coordinates)),
-        np.empty((most, 6)),
-        np.empty((most, N_FIGURES)),
-        np.zeros(len(plan.links), dtype=np.bool_),
-    )
 
 
 @njit(cache=True, nogil=True)

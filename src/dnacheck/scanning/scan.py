@@ -33,13 +33,13 @@ from dnacheck.cyclization.laplace.kernels.quick import KnownMinima
 from dnacheck.cyclization.laplace.quick import QUICK_WINDOW_RT, QuickJ, quick_of_minima
 from dnacheck.equilibria.discrete.kernels.cut import rotated
 from dnacheck.equilibria.discrete.kernels.newton import ENERGY
-from dnacheck.equilibria.discrete.search import search_plan
+from dnacheck.equilibria.discrete.search import room_for, search_plan
 from dnacheck.equilibria.discrete.solve import NewtonOptions
 from dnacheck.io.files import atomic_write
 from dnacheck.io.sequences import Record, SequenceSource
 from dnacheck.model.chain import Chain, build_chain
 from dnacheck.model.chain_kernels import HingeSteps
-from dnacheck.model.cut import least_rotation
+from dnacheck.model.cut_kernels import least_rotation
 from dnacheck.model.molecules import Molecule
 from dnacheck.model.parameters import ParameterSet, load_parameters
 from dnacheck.model.sequence import parse_sequence
@@ -166,7 +166,7 @@ def _row(name: str, chain: Chain, laplace: bool) -> list[str]:
     scale = chain.energy_scale_RT
     plan = search_plan(chain)
     ring = rotated(chain.arrays, least_rotation(chain.arrays))
-    minima = sk.room_for(plan, chain.n_steps, chain.ground.shape[1])
+    minima = room_for(plan, chain.n_steps, chain.ground.shape[1])
     found = sk.scan_molecule(
         ring, plan, NewtonOptions().limits, minima, scale, log_prefactor(chain), figures
     )

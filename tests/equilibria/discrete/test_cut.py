@@ -8,7 +8,7 @@ from dnacheck.equilibria.discrete.kernels.cut import rotated
 from dnacheck.equilibria.discrete.search import find_rings, search_minima
 from dnacheck.equilibria.discrete.solve import NewtonOptions, solve_ring
 from dnacheck.model.chain import Chain, build_chain
-from dnacheck.model.cut import least_rotation
+from dnacheck.model.cut_kernels import least_rotation
 from dnacheck.model.parameters import load_parameters
 from dnacheck.model.sequence import Sequence
 from dnacheck.scanning.scan import COLUMNS, scan_row

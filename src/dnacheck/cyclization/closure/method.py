@@ -27,7 +27,7 @@ class ClosureSampling(Method):
     probe_rate : float
         Fraction of draws that are searched for shapes not counted.
     gradient : bool
-        Compute the derivatives of ln J too, :attr:`JFactor.gradient`.
+        Compute the derivatives of ln J too, :meth:`JFactor.gradient`.
     """
 
     first_batches: int = 20
@@ -78,4 +78,4 @@ class ClosureSampling(Method):
         moments = Moments(profile.chain)
         sampler = ClosureSampler(profile, self.options(run), run.rng)
         result = sampler.result(sampler.draw(run.progress, moments), began)
-        return replace(result, gradient=moments.gradient())
+        return replace(result, derivatives=moments.gradient())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -20,6 +21,10 @@ _MOST_HALVES = 256_000
 _LEAST_RADIUS = 0.15
 _BIAS_POWER = 4
 """What is left of the window's bias grows with this power of its radius."""
+
+
+_LEAST_GROWTH = 1.25
+"""Halves that grow less make no better result worth its time."""
 
 
 @dataclass(frozen=True)
@@ -112,10 +117,12 @@ class HalfChain(Method):
             now = time.perf_counter()
             met = best is not None and best.total_error <= run.tolerance
             # A smaller window holds fewer of the pairs; twice the halves make up for a part.
-            growth = 2 if smaller < radius else 4
-            halves, radius = growth * halves, smaller
-            # Four times the halves make up to sixteen times the pairs.
-            if met or halves > _MOST_HALVES or now + growth * (now - began) > deadline:
+            growth = 2.0 if smaller < radius else 4.0
+            # Four times the halves make up to sixteen times the pairs; what is begun cannot be
+            # broken off.
+            growth = min(growth, math.sqrt(max(deadline - now, 0.0) / max(now - began, 1e-9)))
+            halves, radius = int(growth * halves), smaller
+            if met or halves > _MOST_HALVES or growth < _LEAST_GROWTH:
                 break
         if best is None:
             assert failure is not None

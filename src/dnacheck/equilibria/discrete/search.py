@@ -128,6 +128,17 @@ def room(plan: SearchPlan) -> int:
     return min(_MOST_MINIMA, len(plan.links) * (3 + len(plan.registers)))
 
 
+def room_for(plan: SearchPlan, n_steps: int, coordinates: int) -> Minima:
+    """Room for the minima of one molecule."""
+    most = room(plan)
+    return Minima(
+        np.empty((most, n_steps, coordinates)),
+        np.empty((most, 6)),
+        np.empty((most, nk.N_FIGURES)),
+        np.zeros(len(plan.links), dtype=np.bool_),
+    )
+
+
 def find_rings(chain: Chain, options: SearchOptions | None = None) -> Equilibria:
     """Minima of the closed chain over links and registers, lowest first.
 
@@ -185,13 +196,7 @@ def raw_minima(
         Their places in ``minima``, lowest energy first.
     starts, failed : int
     """
-    most = room(plan)
-    minima = Minima(
-        np.empty((most, *chain.ground.shape)),
-        np.empty((most, 6)),
-        np.empty((most, nk.N_FIGURES)),
-        np.zeros(len(plan.links), dtype=bool),
-    )
+    minima = room_for(plan, *chain.ground.shape)
     found, starts, failed = search(
         chain.arrays, plan, options.limits._replace(minima_only=True), minima
     )

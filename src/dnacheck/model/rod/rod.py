@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dnacheck.model.chain import Chain, chain_frames
-from dnacheck.model.cut import least_rotation
+from dnacheck.model.cut_kernels import least_rotation
 from dnacheck.model.rod import chebyshev
 from dnacheck.model.rod.filtering import double_filter, padded_steps
 from dnacheck.model.rod.natural_frame import NaturalFrame, evaluate_at_parameter, natural_frame
@@ -197,7 +197,7 @@ def build_rod(chain: Chain, options: RodOptions | None = None, cut: int | None =
     options : RodOptions, optional
         Default: the paper's (w, k, m) = (15, 20, 6) with 50 base pairs of padding.
     cut : int, optional
-        Base pair at s = 0. By default that of the canonical cut (:mod:`dnacheck.model.cut`), so
+        Base pair at s = 0. By default that of the canonical cut (``model.cut_kernels``), so
         that a ring has one rod whichever base pair is called the first; the spline's pieces move
         with the cut, and energies with them by about 1e-4 of their value.
 

@@ -1,4 +1,4 @@
-"""Compiled rings as their canonical cut has them (:mod:`dnacheck.model.cut`), and the way back."""
+"""Compiled rings as their canonical cut has them (``model.cut_kernels``), and the way back."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dnacheck.equilibria.boundary_kernels import ring_boundary
 from dnacheck.equilibria.discrete.kernels.moves import residuals
 from dnacheck.equilibria.discrete.kernels.states import by_kind, evaluate, new_state
 from dnacheck.model.chain_kernels import HingeSteps, fill_frames
-from dnacheck.model.cut import rolled
+from dnacheck.model.cut_kernels import rolled
 from dnacheck.model.rigid_kernels import RigidSteps, fill_rigid_frames
 from dnacheck.numerics.arrays import copy_rows, rolled_rows
 

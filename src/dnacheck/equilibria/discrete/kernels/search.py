@@ -31,7 +31,7 @@ from dnacheck.equilibria.discrete.kernels.rigid_starts import fill_rigid_circle,
 from dnacheck.equilibria.discrete.kernels.starts import circle_registers, fill_circle, fill_relaxed
 from dnacheck.equilibria.discrete.kernels.states import by_kind
 from dnacheck.model.chain_kernels import HingeSteps
-from dnacheck.model.cut import least_rotation
+from dnacheck.model.cut_kernels import least_rotation
 from dnacheck.model.rigid_kernels import RigidSteps
 from dnacheck.numerics.arrays import copy_rows
 
