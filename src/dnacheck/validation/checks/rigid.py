@@ -30,6 +30,12 @@ _UNREVERSED = ("CT", "GT", "TC", "TG")
 """The steps that a widely used file of the set has from their complements, not reversed."""
 _STRANDS = 1e-9
 _WITNESSED = 2
+_EVERY_STEP = "AACAGATCCGCTGGTT"
+"""Read as a ring it has each of the 16 steps once."""
+_SHAPES = 5
+_SPREAD = np.array([0.15, 0.1, 0.1, 0.2, 0.2, 0.2])
+"""Standard deviations of random shapes about the ground shape: radians, multiples of the rise."""
+_BEADS = 1e-10
 _SIGMAS = 3.0
 _EXPERIMENT_RT = 0.7
 """Error of the experimental free energies (Section X)."""
@@ -307,6 +313,47 @@ def _strand_control(context: Context) -> CheckResult:
     return must_fail(result, "four steps have the values of their complements unreversed")
 
 
+def beads(context: Context) -> Findings:
+    """Energies of random open chains by OpenMM, from where the beads of their pairs lie."""
+    from dnacheck.md.rigid_beads import RigidBeads
+    from dnacheck.model.chain import build_chain, elastic_energy
+    from dnacheck.model.sequence import Sequence as Letters
+
+    chain = build_chain(Letters("every step", _EVERY_STEP), SET)
+    witness = RigidBeads(chain, closed=False)
+    rng = context.rng()
+
+    def compared(item: str, wrong: Chain | None = None) -> CheckResult:
+        shape = chain.ground + _SPREAD * rng.standard_normal(chain.ground.shape)
+        return judge(
+            f"rigid.beads[{item}]",
+            "energy of a random shape from its coordinates",
+            elastic_energy(wrong or chain, shape),
+            witness.energy_RT(witness.positions(shape)),
+            Rule.RELATIVE,
+            "OpenMM, from positions of four beads a base pair",
+            "both are sums of 16 terms in double precision",
+            _BEADS,
+            "RT",
+        )
+
+    ground, lengths = chain.ground.copy(), chain.ground.copy()
+    tilted = int(np.argmax(np.abs(ground[:, 1])))
+    ground[tilted, 1] *= -1.0
+    lengths[:, 3:] *= chain.rise_A
+    controls = [
+        must_fail(
+            compared("control: sign", replace(chain, ground=ground)),
+            "one step's tilt has the other sign",
+        ),
+        must_fail(
+            compared("control: unit", replace(chain, ground=lengths)),
+            "translations in Å are read as multiples of the rise",
+        ),
+    ]
+    return Findings([*(compared(f"shape {i + 1}") for i in range(_SHAPES)), *controls])
+
+
 def _outside_table(rows: Sequence[Mapping[str, Any]]) -> Table:
     return Table(
         "rigid-outside",
@@ -429,5 +476,7 @@ GROUP = Group(
               ("rigid_ln_J",), Level.QUICK),
         Check("rigid.molecules", "Olson's set beside Trifonov II and experiment", molecules, 2.5,
               ("rigid_ln_J",), Level.QUICK),
+        Check("rigid.beads", "energies of rigid steps by OpenMM", beads, 4.0, ("rigid_ln_J",),
+              Level.FULL, requires=("dnacheck.md.rigid_beads", "openmm")),
     ),
 )  # fmt: skip
