@@ -181,3 +181,12 @@ def test_a_chain_made_of_arrays_is_the_same_from_every_cut():
         there = Chain("arrays", np.roll(ground, -cut, 0), np.roll(stiffness, -cut, 0))
         found = find_rings(there)
         assert [r.energy for r in found.equilibria] == [r.energy for r in reference.equilibria]
+
+
+def test_a_molecule_bent_by_a_turn_misleads_no_search():
+    """Second-order prediction is no guide there: every link in reach is started from."""
+    letters = "AAAAAACGGGCAAAAAACGGC" * 14
+    chain = build_chain(parse_sequence(letters, "phased A-tracts"), "trifonov")
+    auto = find_rings(chain).lowest
+    every = find_rings(chain, SearchOptions(links="all")).lowest
+    assert auto.energy_RT == pytest.approx(every.energy_RT, rel=1e-9)
