@@ -5,12 +5,12 @@ import pytest
 
 from dnacheck.cyclization.laplace.isolated import laplace
 from dnacheck.equilibria.discrete.kernels.cut import rotated
-from dnacheck.equilibria.discrete.search import find_rings, search_minima
+from dnacheck.equilibria.discrete.search import SearchOptions, find_rings, search_minima
 from dnacheck.equilibria.discrete.solve import NewtonOptions, solve_ring
 from dnacheck.model.chain import Chain, build_chain
 from dnacheck.model.cut_kernels import least_rotation
 from dnacheck.model.parameters import load_parameters
-from dnacheck.model.sequence import Sequence
+from dnacheck.model.sequence import Sequence, parse_sequence
 from dnacheck.scanning.scan import COLUMNS, scan_row
 
 SETS = ("trifonov2", "trifonov", "desantis")
