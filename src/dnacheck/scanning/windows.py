@@ -38,11 +38,14 @@ SEARCH_EVERY = 32
 _ROOM = 24
 """Minima that are followed at once."""
 _JUMP_RT = 3.0
-_HEIGHT_RT = 18.0
+_TOLERANCE = 1e-8
+"""Of residuals; energies err by its square."""
+_HEIGHT_RT = 10.0
 """Minima that lie higher above the lowest are not followed: they hold nothing of J."""
 _AGREE = 1e-9
 _PILOTS = 400
-_MARGIN = 1.3
+_SHARE = 0.95
+"""Of the windows that may have two minima, those that are looked at."""
 _AGREE_LN_J = 5e-4
 
 FOUND, FREE_REGISTER, NO_RING, OTHER_LETTERS = range(4)
@@ -171,7 +174,7 @@ class WindowScanner:
         self.chain = replace(pattern, name="window", letters="", ground=ground, stiffness=stiffness)
         self.steps = self.chain.arrays._replace(ground=ground.copy(), stiffness=stiffness.copy())
         self.inside = np.empty(n, dtype=bool)
-        self.limits = NewtonOptions().limits
+        self.limits = NewtonOptions(tolerance=_TOLERANCE).limits
         self.amplitude_RT = self._amplitude_of_two()
         self.minima = wk.Followed(
             np.empty((_ROOM, n, d)),
@@ -182,11 +185,11 @@ class WindowScanner:
         )
 
     def _amplitude_of_two(self) -> float:
-        """Amplitude in RT up to which random windows are predicted to have two minima."""
+        """Amplitude in RT up to which most random windows with room for two minima have theirs."""
         if not isinstance(self.steps, HingeSteps):
             return 0.0
         rng = np.random.default_rng(0)
-        largest = 0.0
+        found = [0.0]
         work = wk.new_work(self.steps)
         for _ in range(_PILOTS):
             codes = rng.integers(0, len(BASES), self.window).astype(np.uint8)
@@ -194,8 +197,8 @@ class WindowScanner:
             link = round(float(self.steps.ground[:, 0].sum()) / (2.0 * np.pi))
             count, lacking = wk.has_room(self.steps, link, work)
             if count > 1 or lacking < wk.LACKING:
-                largest = max(largest, wk.amplitude_of_link(self.steps, link, work))
-        return _MARGIN * largest * self.chain.energy_scale_RT
+                found.append(wk.amplitude_of_link(self.steps, link, work))
+        return float(np.quantile(found, _SHARE)) * self.chain.energy_scale_RT
 
     def chain_at(self, codes: NDArray[np.uint8], start: int) -> Chain:
         """Chain of the window at ``start``, cut where the ring of windows is."""
