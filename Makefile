@@ -14,7 +14,7 @@ FIND_PYTHON = for p in $(PYTHON) python3.11 python3.12 python3.13 python3; do \
 	then echo $$p; break; fi; done
 
 .DEFAULT_GOAL := help
-.PHONY: help install validate test lint slow md oracles coverage docs bench notebooks wheel-check \
+.PHONY: help install validate test lint slow md mutation oracles coverage docs bench notebooks wheel-check \
 	lock clean
 
 help: ## this list
@@ -65,6 +65,9 @@ slow: $(STAMP) ## tests of minutes
 
 md: $(STAMP) ## tests that run OpenMM dynamics
 	$(PYTEST) -m md
+
+mutation: $(STAMP) ## break the kernels 200 times; hours
+	$(PY) tests/mutation.py --count 200 --jobs $(JOBS)
 
 oracles: $(STAMP) ## comparisons with independent programs; absent ones are skipped
 	@sh validation/oracles/auto07p/install.sh
