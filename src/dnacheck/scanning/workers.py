@@ -74,7 +74,7 @@ class Cluster:
 
     def run(self, settings: Settings, pieces: Iterable[Piece]) -> Iterator[Result]:
         """Results as they come; Dask does the pieces of a dead worker again."""
-        shared = self.client.scatter([settings], broadcast=True)[0]
+        shared = self.client.scatter([settings], broadcast=True, hash=False)[0]
         pool = self.client.get_executor(pure=False, retries=3)
         threads = sum(self.client.nthreads().values()) or 1
         yield from _spread(pool, threads, shared, iter(pieces), [])
