@@ -173,6 +173,11 @@ def main() -> int:
     every = [mutant for path in files for mutant in mutants_of(path)]
     sample = random.Random(chosen.seed).sample(every, min(chosen.count, len(every)))
     print(f"{len(sample)} of {len(every)} mutants of {len(files)} files")
+    for tests in {str(tests_for(mutant.file)): mutant for mutant in sample}.values():
+        # The same file with nothing changed: tests that fail anyway kill every mutant.
+        if killed(tests._replace(new=tests.old)):
+            print(f"the tests of {tests.file} fail without a mutant")
+            return 2
     survivors = []
     with ThreadPoolExecutor(chosen.jobs) as pool:
         for mutant, dead in zip(sample, pool.map(killed, sample), strict=True):

@@ -133,7 +133,8 @@ def memory(megabases: int = 12) -> None:
         for end in (1_000_000, 1_000_000 * megabases):
             code = (
                 "import resource, sys; from dnacheck.cli import main; "
-                f"main(['scan', {str(path)!r}, '--window', '150', '--step', '400', '--threads', "
+                f"main(['scan', {str(path)!r}, '--window', '150', '--step', '400', "
+                "'--piece', '41', '--threads', "
                 f"'1', '--quiet', '-o', {str(Path(folder) / f'o{end}.parquet')!r}, '--region', "
                 f"'c:1-{end}']); print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
             )
