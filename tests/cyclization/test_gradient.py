@@ -1,13 +1,16 @@
 """Derivatives of ln J from the draws that gave it."""
 
 import math
+import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from dnacheck.cyclization.gradient import closed_draws, log_j_gradient
+from dnacheck.cyclization.closure import method as closure_method
+from dnacheck.cyclization.gradient import closed_draws
 from dnacheck.cyclization.laplace.isolated import laplace
+from dnacheck.cyclization.laplace.register import register_profile
 from dnacheck.cyclization.methods import ClosureSampling
 from dnacheck.model.chain import Chain, build_chain
 from dnacheck.model.molecules import embedded
@@ -16,6 +19,7 @@ from dnacheck.numerics.outcome import InputError
 
 SEEDS = range(6)
 FIXED = ClosureSampling(first_batches=40, most_draws=1)
+WITH_GRADIENT = replace(FIXED, gradient=True)
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +89,7 @@ def test_central_differences_with_common_random_numbers(chain, name):
         for s in SEEDS
     ]
     spread = np.std(differences, ddof=1) / math.sqrt(len(differences))
-    gradient = log_j_gradient(chain, FIXED, rng=99, tolerance=10.0).derivatives
+    gradient = WITH_GRADIENT.compute(chain, rng=99, tolerance=10.0).derivatives
     value, stderr = gradient.along(ground, stiffness)
     assert stderr > 0.0
     # 3.5: six parameters are compared, and six seeds give the spread.
@@ -107,7 +111,7 @@ def stiff_ring(factor):
 def test_the_limit_of_a_stiff_chain_of_twelve_steps():
     """There Laplace is exact, and so are its central differences."""
     chain = stiff_ring(1000.0)
-    gradient = log_j_gradient(chain, ClosureSampling(), rng=1, tolerance=1e-3).derivatives
+    gradient = ClosureSampling(gradient=True).compute(chain, rng=1, tolerance=1e-3).derivatives
     pulls, per_stiffness = np.empty((12, 3)), np.empty((12, 3))
     for s in range(12):
         for i in range(3):
@@ -132,7 +136,7 @@ def test_the_limit_of_a_stiff_chain_of_twelve_steps():
 
 def test_a_wrong_sign_would_be_seen(chain):
     """Negative control: the derivative along the ring's own strain is far from zero."""
-    gradient = log_j_gradient(chain, FIXED, rng=2, tolerance=10.0).derivatives
+    gradient = WITH_GRADIENT.compute(chain, rng=2, tolerance=10.0).derivatives
     strain = gradient.ground / chain.energy_scale_RT
     value, stderr = gradient.along(strain)
     assert value > 30.0 * stderr
@@ -156,12 +160,28 @@ def test_the_same_draws_give_j_with_and_without_its_gradient(chain):
     np.testing.assert_allclose(found, by_draws, atol=1e-9 * np.abs(found).max())
 
 
+@pytest.mark.parametrize("gradient", [False, True])
+def test_the_time_of_finding_the_minima_counts_once(chain, gradient, monkeypatch):
+    profile = replace(register_profile(chain), seconds=0.3)
+
+    def slowly(_):
+        time.sleep(profile.seconds)
+        return profile
+
+    monkeypatch.setattr(closure_method, "register_profile_of", slowly)
+    method = ClosureSampling(gradient=gradient)
+    for compute in (method.compute, lambda *a, **k: closed_draws(*a, **k).result):
+        began = time.perf_counter()
+        result = compute(chain, tolerance=10.0)
+        assert profile.seconds < result.seconds < time.perf_counter() - began
+
+
 def test_errors_cover_the_spread_over_seeds(chain):
     """Chained to the persistence length, where steps are correlated."""
     scale = chain.energy_scale_RT * chain.stiffness
     values, errors = zip(
         *(
-            log_j_gradient(chain, FIXED, rng=s, tolerance=10.0).derivatives.along(stiffness=scale)
+            WITH_GRADIENT.compute(chain, rng=s, tolerance=10.0).derivatives.along(stiffness=scale)
             for s in range(40)
         ),
         strict=True,
@@ -183,7 +203,7 @@ def test_every_shape_that_is_drawn_closes(chain):
 
 
 def test_a_derivative_of_another_shape_is_refused(chain):
-    gradient = log_j_gradient(chain, FIXED, tolerance=10.0).derivatives
+    gradient = WITH_GRADIENT.compute(chain, tolerance=10.0).derivatives
     with pytest.raises(InputError, match="ground must have the shape"):
         gradient.along(np.ones(3))
 

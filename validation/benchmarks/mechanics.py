@@ -12,7 +12,7 @@ import time
 
 import numpy as np
 
-from dnacheck.cyclization.gradient import closed_draws, log_j_gradient
+from dnacheck.cyclization.gradient import closed_draws
 from dnacheck.cyclization.methods import Auto, ClosureSampling
 from dnacheck.mechanics.fit import FitOptions, fit_mechanics
 from dnacheck.mechanics.local_model import local_model
@@ -77,7 +77,7 @@ def cost() -> None:
         began = time.perf_counter()
         ClosureSampling().compute(chain, rng=k, tolerance=0.01)
         middle = time.perf_counter()
-        log_j_gradient(chain, rng=k, tolerance=0.01)
+        ClosureSampling(gradient=True).compute(chain, rng=k, tolerance=0.01)
         end = time.perf_counter()
         if k > 1:
             alone.append(middle - began)

@@ -27,8 +27,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dnacheck.cyclization.closure.method import ClosureSampling
-from dnacheck.cyclization.closure.sampling import ClosureSampler, Draws
-from dnacheck.cyclization.method import DEFAULT_TOLERANCE, Run, register_profile_of
+from dnacheck.cyclization.closure.sampling import Draws
+from dnacheck.cyclization.method import DEFAULT_TOLERANCE, Run
 from dnacheck.cyclization.result import JFactor
 from dnacheck.model.chain import Chain
 from dnacheck.model.named_parameters import chain_derivatives, own_value
@@ -58,9 +58,6 @@ class LogJGradient:
         that a symmetric change dK changes ln J by the sum of the products of all elements.
     ground_batches, stiffness_batches : ndarray, shapes (B, N, d), (B, N, d, d)
         Values of independent batches, whose means are the above.
-    log_j_batches : ndarray, shape (B,)
-        The same batches' deviations of ln J from its estimate, for the correlation of a derivative
-        with J itself.
     chain : Chain
     """
 
@@ -68,7 +65,6 @@ class LogJGradient:
     stiffness: Array
     ground_batches: Array = field(repr=False)
     stiffness_batches: Array = field(repr=False)
-    log_j_batches: Array = field(repr=False)
     chain: Chain = field(repr=False)
 
     @property
@@ -123,7 +119,7 @@ class LogJGradient:
         self, ground: ArrayLike | None = None, stiffness: ArrayLike | None = None
     ) -> Array:
         """The batches' values (B,) of the derivative of :meth:`along`."""
-        total = np.zeros(len(self.log_j_batches))
+        total = np.zeros(len(self.ground_batches))
         for name, change, batches in (
             ("ground", ground, self.ground_batches),
             ("stiffness", stiffness, self.stiffness_batches),
@@ -156,7 +152,6 @@ class Moments:
         self.stiffness = chain.energy_scale_RT * np.asarray(chain.stiffness)
         n, d = chain.ground.shape
         self.weight = np.zeros(_MOST_GROUPS)
-        self.count = np.zeros(_MOST_GROUPS)
         self.first = np.zeros((_MOST_GROUPS, n, d))
         self.second = np.zeros((_MOST_GROUPS, n, d, d))
         self.batches = 0
@@ -169,7 +164,6 @@ class Moments:
         weights = draws.weights[order]
         strains = draws.record.strains[order]
         self.weight[present] += np.add.reduceat(weights.sum(axis=1), starts)
-        self.count[present] += np.add.reduceat(np.full(len(order), 2.0), starts)
         d = strains.shape[-1]
         # One coordinate at a time: the products of all would be d times the strains' memory.
         for i in range(d):
@@ -181,7 +175,7 @@ class Moments:
 
     def gradient(self) -> LogJGradient:
         """The derivatives from all rounds so far."""
-        used = self.count > 0.0
+        used = slice(min(self.batches, _MOST_GROUPS))
         weight, first, second = self.weight[used], self.first[used], self.second[used]
         second = second + np.triu(np.ones(second.shape[-2:]), 1).T * np.swapaxes(second, -1, -2)
         mean_weight = weight.mean()
@@ -196,13 +190,11 @@ class Moments:
         products = influence(second)
         pulls = np.einsum("sij,bsj->bsi", self.stiffness, strains)
         per_stiffness = 0.5 * (np.linalg.inv(self.stiffness) - products)
-        rate = self.weight[used] / self.count[used]
         return LogJGradient(
             ground=pulls.mean(axis=0),
             stiffness=per_stiffness.mean(axis=0),
             ground_batches=pulls,
             stiffness_batches=per_stiffness,
-            log_j_batches=rate / rate.mean() - 1.0,
             chain=self.chain,
         )
 
@@ -252,32 +244,6 @@ class ClosedDraws:
         return mean, _errors(sums)
 
 
-def log_j_gradient(
-    target: Target,
-    method: ClosureSampling | None = None,
-    *,
-    rng: Randomness = 0,
-    threads: int = 1,
-    progress: Callable[[int], None] | None = None,
-    tolerance: float = DEFAULT_TOLERANCE,
-    max_seconds: float = float("inf"),
-) -> JFactor:
-    """J factor with derivatives, from the same draws.
-
-    Parameters
-    ----------
-    target : Chain, Equilibria or RegisterProfile
-    method : ClosureSampling, optional
-
-    Raises
-    ------
-    SolveError
-        No register-constrained minimum, or no draw could be closed.
-    """
-    run = Run(rng, threads, progress, tolerance, max_seconds)
-    return (method or ClosureSampling()).with_gradient(target, run)
-
-
 def closed_draws(
     target: Target,
     method: ClosureSampling | None = None,
@@ -290,7 +256,7 @@ def closed_draws(
 ) -> ClosedDraws:
     """Exactly closed shapes with weights, drawn until ln J has the asked standard error.
 
-    All shapes are kept, 8 d N bytes each; :func:`log_j_gradient` keeps sums only.
+    All shapes are kept, 8 d N bytes each; :class:`Moments` keeps sums only.
 
     Parameters
     ----------
@@ -304,10 +270,9 @@ def closed_draws(
     SolveError
         No register-constrained minimum, or no draw could be closed.
     """
-    began = time.perf_counter()
     run = Run(rng, threads, progress, tolerance, max_seconds)
-    profile = register_profile_of(target)
-    sampler = ClosureSampler(profile, (method or ClosureSampling()).options(run), rng)
+    sampler = (method or ClosureSampling()).sampler(target, run)
+    began = time.perf_counter()
     kept: list[Array] = []
 
     def keep(draws: Draws) -> None:
@@ -319,7 +284,7 @@ def closed_draws(
     weights = draws.weights.ravel()
     counted = weights > 0.0
     return ClosedDraws(
-        chain=profile.chain,
+        chain=sampler.profile.chain,
         result=result,
         strains=np.concatenate(kept),
         weights=weights[counted] / weights.sum(),

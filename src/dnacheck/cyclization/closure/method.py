@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from dnacheck.cyclization.method import Method, Run, register_profile_of
 
 if TYPE_CHECKING:
-    from dnacheck.cyclization.closure.sampling import ClosureOptions
+    from dnacheck.cyclization.closure.sampling import ClosureOptions, ClosureSampler
     from dnacheck.cyclization.method import Target
     from dnacheck.cyclization.result import JFactor
 
@@ -57,25 +57,21 @@ class ClosureSampling(Method):
             threads=run.threads,
         )
 
-    def run(self, target: Target, run: Run) -> JFactor:
-        if self.gradient:
-            return self.with_gradient(target, run)
+    def sampler(self, target: Target, run: Run) -> ClosureSampler:
+        """What draws for a target, with the time that finding its minima leaves of the run's."""
         from dnacheck.cyclization.closure.sampling import ClosureSampler
 
         began = time.perf_counter()
         profile = register_profile_of(target)
         left = max(run.max_seconds - (time.perf_counter() - began), 1e-3)
-        sampler = ClosureSampler(profile, self.options(replace(run, max_seconds=left)), run.rng)
-        return sampler.sample(run.progress)
+        return ClosureSampler(profile, self.options(replace(run, max_seconds=left)), run.rng)
 
-    def with_gradient(self, target: Target, run: Run) -> JFactor:
-        """The same result, with its gradient from the same draws."""
-        from dnacheck.cyclization.closure.sampling import ClosureSampler
+    def run(self, target: Target, run: Run) -> JFactor:
+        sampler = self.sampler(target, run)
+        if not self.gradient:
+            return sampler.sample(run.progress)
         from dnacheck.cyclization.gradient import Moments
 
-        began = time.perf_counter()
-        profile = register_profile_of(target)
-        moments = Moments(profile.chain)
-        sampler = ClosureSampler(profile, self.options(run), run.rng)
-        result = sampler.result(sampler.draw(run.progress, moments), began)
+        moments = Moments(sampler.profile.chain)
+        result = sampler.sample(run.progress, moments)
         return replace(result, derivatives=moments.gradient())

@@ -205,8 +205,17 @@ class ClosureSampler:
             unfinished = sum(map(work, busy))
         return Draws(record, batch[order], unfinished)
 
-    def sample(self, progress: Callable[[int], None] | None = None) -> JFactor:
+    def sample(
+        self,
+        progress: Callable[[int], None] | None = None,
+        watch: Callable[[Draws], None] | None = None,
+    ) -> JFactor:
         """Sample until the tolerance, the time or the number of draws is reached.
+
+        Parameters
+        ----------
+        watch : callable, optional
+            See :meth:`draw`.
 
         Returns
         -------
@@ -221,7 +230,7 @@ class ClosureSampler:
             No draw could be closed.
         """
         began = time.perf_counter()
-        return self.result(self.draw(progress), began)
+        return self.result(self.draw(progress, watch), began)
 
     def draw(
         self,
